@@ -409,7 +409,7 @@ class MappingReader {
 
   static Coordinate ReadCoordinate(const JsonReader& json) {
     const std::string name = json.String();
-    for (int i = 0; i < kCoordinates; ++i) {
+    for (int i = 0; i < kBodyCoordinates; ++i) {
       if (name == NameOf(static_cast<Coordinate>(i))) {
         return static_cast<Coordinate>(i);
       }

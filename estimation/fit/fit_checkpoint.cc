@@ -246,6 +246,9 @@ void AddObservations(const FitProblem& problem, BitHash* to) {
     hash.AddAll(std::array<double, 2>{static_cast<double>(o.body), static_cast<double>(o.point)});
     hash.Add(static_cast<int>(o.coordinate));
     hash.AddAll(std::array<double, 3>{o.time, o.value, o.sigma});
+    if (IsForce(o.coordinate)) {
+      for (const int number : {o.joint, o.pair[0], o.pair[1]}) hash.Add(number);
+    }
     if (o.event < 0) continue;
     const ObservedEvent& event = problem.instruments.events[o.event];
     for (const int number :

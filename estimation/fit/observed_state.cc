@@ -194,8 +194,7 @@ class StateProblem : public LeastSquaresProblem {
   void AddJoints(const State<double>& state, Eigen::Index* row, Eigen::VectorXd* rows) const {
     for (const JointIndex& joint : model_.structure->joints) {
       JointRows<double> equations;
-      EvaluateJoint(joint.type, state.PoseOf(joint.a), state.PoseOf(joint.b),
-                    &model_.parameters[joint.geometry], &equations);
+      EvaluateJoint(model_, state, joint, &equations);
       for (int k = 0; k < equations.rows; ++k) {
         const double rate =
             RelativeSpeed(state, joint.a, equations.row_a[k], joint.b, equations.row_b[k]);
@@ -289,9 +288,9 @@ std::vector<SmoothedSeries> SmoothAt(const RolloutResiduals& residuals, double t
   }
   std::vector<SmoothedSeries> all;
   for (size_t i = 0; i < samples.size(); ++i) {
-    // Events and accelerations say nothing about a state alone.
+    // Events, accelerations and forces say nothing about a state alone.
     const Observation& one = observations[index.first[i]];
-    if (one.event >= 0 || IsAcceleration(one.coordinate)) continue;
+    if (one.event >= 0 || IsAcceleration(one.coordinate) || IsForce(one.coordinate)) continue;
     all.push_back(Smooth(std::move(samples[i])));
     all.back().observation = index.first[i];
   }

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tangible/dynamics/elements/joint.h"
+#include "tangible/dynamics/elements/joint_coupling_inl.h"
 #include "tangible/dynamics/jacobian/equation_jacobian.h"
 #include "tangible/dynamics/model/state_variable.h"
 #include "tangible/estimation/fit/linearisation.h"
@@ -197,56 +197,78 @@ int ShootingResiduals::num_joint_rows() const {
 
 /// Errors and rates of the joints at the start of the segment after this one.
 void ShootingResiduals::AddJoints(int segment, Run* run) const {
+  int row = num_observations() + num_states() + segment * num_joint_rows();
+  for (const JointIndex& joint : residuals_->scene().model().structure->joints) {
+    const bool ends = IsReleased(*residuals_->scene().model().structure, run->state, joint);
+    for (int k = 0; k < (joint.IsCoupling() ? 2 : 1) && !ends; ++k) {
+      AddJointShare(joint, k, segment, row, run);
+    }
+    row += 6;
+  }
+}
+
+/// Those of one joint, or the share that coordinate k of a coupling has in them.
+void ShootingResiduals::AddJointShare(const JointIndex& joint, int k, int segment, int row,
+                                      Run* run) const {
   const Model<double>& model = residuals_->scene().model();
   const ModelStructure& s = *model.structure;
   const State<double>& state = run->state;
-  int row = num_observations() + num_states() + segment * num_joint_rows();
-  for (const JointIndex& joint : s.joints) {
-    int variables[kLocalJetWidth];
-    LocalJet local[kLocalJetWidth];
+  const JointIndex& of = joint.IsCoupling() ? s.joints[joint.coupled[k]] : joint;
+  int variables[kLocalJetWidth];
+  LocalJet local[kLocalJetWidth];
+  for (int i = 0; i < 6; ++i) {
+    const int body = i < 3 ? of.a : of.b;
+    variables[i] = s.PoseVariable(body, i % 3);
+    local[i] = LocalJet(state.pose[3 * static_cast<size_t>(body) + i % 3], i);
+  }
+  int count = 6;
+  const auto number = [&](int place) {
+    variables[count] = s.ParameterVariable(place);
+    local[count] = LocalJet(model.parameters[place], count);
+    ++count;
+  };
+  for (int i = 0; i < of.num_geometry; ++i) number(of.geometry + i);
+  JointRows<LocalJet> rows;
+  EvaluateJoint(of.type, Pose<LocalJet>(Vector2<LocalJet>(local[0], local[1]), local[2]),
+                Pose<LocalJet>(Vector2<LocalJet>(local[3], local[4]), local[5]), local + 6, &rows);
+  if (joint.IsCoupling()) {
+    number(joint.geometry + (k == 0 ? 1 : 0));
+    const LocalJet numbers[2] = {local[count - 1], local[count - 1]};
+    ScaleToShare(joint.type, k, numbers, &rows);
+  }
+  for (int r = 0; r < rows.rows; ++r) {
+    LocalJet rate(0.0);
+    Eigen::RowVectorXd by_twist = Eigen::RowVectorXd::Zero(run->w_dot.cols());
     for (int i = 0; i < 6; ++i) {
-      const int body = i < 3 ? joint.a : joint.b;
-      variables[i] = s.PoseVariable(body, i % 3);
-      local[i] = LocalJet(state.pose[3 * static_cast<size_t>(body) + i % 3], i);
-    }
-    for (int i = 0; i < joint.num_geometry; ++i) {
-      variables[6 + i] = s.ParameterVariable(joint.geometry + i);
-      local[6 + i] = LocalJet(model.parameters[joint.geometry + i], 6 + i);
-    }
-    JointRows<LocalJet> rows;
-    EvaluateJoint(joint.type, Pose<LocalJet>(Vector2<LocalJet>(local[0], local[1]), local[2]),
-                  Pose<LocalJet>(Vector2<LocalJet>(local[3], local[4]), local[5]), local + 6,
-                  &rows);
-    for (int r = 0; r < rows.rows; ++r) {
-      LocalJet rate(0.0);
-      Eigen::RowVectorXd by_twist = Eigen::RowVectorXd::Zero(run->w_dot.cols());
-      for (int i = 0; i < 6; ++i) {
-        const int body = i < 3 ? joint.a : joint.b;
-        const LocalJet& entry = i < 3 ? rows.row_a[r][i] : rows.row_b[r][i - 3];
-        rate += entry * state.twist[3 * static_cast<size_t>(body) + i % 3];
-        if (run->jacobian != nullptr) {
-          by_twist += entry.a * run->w_dot.row(s.TwistVariable(body, i % 3));
-        }
-      }
-      const LocalJet* const values[2] = {&rows.error[r], &rate};
-      for (int k = 0; k < 2; ++k) {
-        const double weight = (k == 0 ? 1.0 : segment_seconds_) / joint_sigma_;
-        (*run->residuals)[row + 2 * r + k] = weight * values[k]->a;
-        if (run->jacobian == nullptr) {
-          continue;
-        }
-        Eigen::RowVectorXd dots =
-            k == 0 ? Eigen::RowVectorXd::Zero(run->w_dot.cols()).eval() : by_twist;
-        for (int v = 0; v < 6 + joint.num_geometry; ++v) {
-          dots += values[k]->v[v] * run->w_dot.row(variables[v]);
-        }
-        auto out = run->jacobian->row(row + 2 * r + k);
-        out.head(num_parameters_) = weight * dots.head(num_parameters_);
-        out.segment(num_parameters_ + segment * state_size_, state_size_) =
-            weight * dots.tail(state_size_);
+      const int body = i < 3 ? of.a : of.b;
+      const LocalJet& entry = i < 3 ? rows.row_a[r][i] : rows.row_b[r][i - 3];
+      rate += entry * state.twist[3 * static_cast<size_t>(body) + i % 3];
+      if (run->jacobian != nullptr) {
+        by_twist += entry.a * run->w_dot.row(s.TwistVariable(body, i % 3));
       }
     }
-    row += 6;
+    const LocalJet* const values[2] = {&rows.error[r], &rate};
+    for (int m = 0; m < 2; ++m) {
+      const double weight = (m == 0 ? 1.0 : segment_seconds_) / joint_sigma_;
+      const int at = row + 2 * r + m;
+      (*run->residuals)[at] = weight * values[m]->a + (k == 0 ? 0.0 : (*run->residuals)[at]);
+      if (run->jacobian == nullptr) {
+        continue;
+      }
+      Eigen::RowVectorXd dots =
+          m == 0 ? Eigen::RowVectorXd::Zero(run->w_dot.cols()).eval() : by_twist;
+      for (int v = 0; v < count; ++v) {
+        dots += values[m]->v[v] * run->w_dot.row(variables[v]);
+      }
+      auto out = run->jacobian->row(at);
+      auto of_state = out.segment(num_parameters_ + segment * state_size_, state_size_);
+      if (k == 0) {
+        out.head(num_parameters_).setZero();
+        of_state.setZero();
+      }
+      out.head(num_parameters_) += weight * dots.head(num_parameters_);
+      of_state += weight * dots.tail(state_size_);
+    }
   }
 }
 

@@ -73,6 +73,7 @@ class ShootingResiduals {
   void Meet(int segment, Run* run) const;
   int num_joint_rows() const;
   void AddJoints(int segment, Run* run) const;
+  void AddJointShare(const JointIndex& joint, int k, int segment, int row, Run* run) const;
   void Scatter(const Run& run) const;
   double JumpWeight(int i) const;
 

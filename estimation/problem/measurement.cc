@@ -123,6 +123,11 @@ Local Pick(Coordinate coordinate, const Motion6& motion) {
     case Coordinate::kAx:  // acceleration.h
     case Coordinate::kAy:
     case Coordinate::kAlpha:
+    case Coordinate::kFx:  // force_rows.h
+    case Coordinate::kFy:
+    case Coordinate::kTorque:
+    case Coordinate::kNormal:
+    case Coordinate::kTangent:
     case Coordinate::kTime:  // no coordinate of a motion
       break;
   }
@@ -184,6 +189,11 @@ Prediction PredictPlain(Coordinate coordinate, const Place& place) {
     case Coordinate::kAx:  // acceleration.h
     case Coordinate::kAy:
     case Coordinate::kAlpha:
+    case Coordinate::kFx:  // force_rows.h
+    case Coordinate::kFy:
+    case Coordinate::kTorque:
+    case Coordinate::kNormal:
+    case Coordinate::kTangent:
     case Coordinate::kTime:  // no coordinate of a motion
       break;
   }

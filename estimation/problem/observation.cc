@@ -19,7 +19,8 @@ namespace tangible {
 namespace {
 
 constexpr std::array<const char*, kCoordinates + 1> kNames = {
-    "x", "y", "angle", "vx", "vy", "omega", "distance", "ax", "ay", "alpha", "time"};
+    "x",  "y",     "angle", "vx", "vy",     "omega",  "distance", "ax",
+    "ay", "alpha", "fx",    "fy", "torque", "normal", "tangent",  "time"};
 
 // Number of samples whose mean rate predicts the next angle.
 constexpr size_t kUnwrapSamples = 10;
@@ -39,27 +40,35 @@ class RowReader {
   RowReader(const CsvTable& table, const ObservedScene& scene, const ObservationOptions& options,
             std::vector<Channel>* channels, std::string* error)
       : table_(table), scene_(scene), options_(options), channels_(channels), error_(error) {
-    by_point_ = table_.Column("point") >= 0;
+    for (const Target target : {Target::kBody, Target::kPoint, Target::kJoint, Target::kContact}) {
+      if (table_.Column(NameOf(target)) < 0) continue;
+      target_ = target;
+      ++num_targets_;
+    }
     relative_to_ = table_.Column("relative_to");
   }
 
   /// Checks that the header names the observed bodies or points and the coordinates.
   bool CheckHeader() {
-    if (by_point_ == (table_.Column("body") >= 0)) {
-      *error_ = table_.file + ": header: expected a column body or a column point, got " +
-                (by_point_ ? "both" : "neither");
+    if (num_targets_ != 1) {
+      *error_ = table_.file + ": header: expected one column body, point, joint or contact, got " +
+                (num_targets_ == 0 ? "none" : "several");
       return false;
     }
+    bool any = false;
     for (int i = 0; i < kCoordinates; ++i) {
-      if (table_.Column(kNames[i]) >= 0) {
-        return true;
-      }
+      if (table_.Column(kNames[i]) < 0) continue;
+      any = true;
+      if (IsOf(static_cast<Coordinate>(i))) continue;
+      *error_ = table_.file + ": header: expected the coordinates of a " + NameOf(target_) + " (" +
+                CoordinatesOf() + "), got " + kNames[i];
+      return false;
     }
-    *error_ = table_.file +
-              ": header: expected a column x, y, angle, vx, vy, omega, distance, ax, ay or alpha, "
-              "got none "
-              "of them";
-    return false;
+    if (!any) {
+      *error_ =
+          table_.file + ": header: expected a column " + CoordinatesOf() + ", got none of them";
+    }
+    return any;
   }
 
   bool Read(int row, const ObservationSigma& sigma, std::vector<Observation>* observations) {
@@ -84,6 +93,10 @@ class RowReader {
         return Fail(row, std::string(kNames[i]) +
                              ": expected no camera and no relative_to of an acceleration, got one");
       }
+      if (IsForce(observation.coordinate) && (channel.camera >= 0 || channel.to_body >= 0)) {
+        return Fail(row, std::string(kNames[i]) +
+                             ": expected no camera and no relative_to of a force, got one");
+      }
       if (!ReadCell(table_, row, column, &observation.value, error_)) {
         return false;
       }
@@ -94,6 +107,53 @@ class RowReader {
   }
 
  private:
+  enum class Target { kBody, kPoint, kJoint, kContact };
+  static const char* NameOf(Target target) {
+    return target == Target::kBody    ? "body"
+           : target == Target::kPoint ? "point"
+           : target == Target::kJoint ? "joint"
+                                      : "contact";
+  }
+
+  /// Whether what is observed has the coordinate.
+  bool IsOf(Coordinate coordinate) const {
+    if (!IsForce(coordinate)) return target_ == Target::kBody || target_ == Target::kPoint;
+    const bool is_of_contact =
+        coordinate == Coordinate::kNormal || coordinate == Coordinate::kTangent;
+    return target_ == (is_of_contact ? Target::kContact : Target::kJoint);
+  }
+  std::string CoordinatesOf() const {
+    return target_ == Target::kJoint     ? "fx, fy or torque"
+           : target_ == Target::kContact ? "normal or tangent"
+                                         : "x, y, angle, vx, vy, omega, distance, ax, ay or alpha";
+  }
+
+  bool FindJoint(int row, const std::string& name, Observation* observation) {
+    for (size_t j = 0; j < scene_.scene.joints.size(); ++j) {
+      const BasicJoint<double>& joint = scene_.scene.joints[j];
+      if (joint.name != name) continue;
+      observation->joint = static_cast<int>(j);
+      return joint.type != JointType::kCoupling ||
+             Fail(row, "joint: expected a joint of two bodies, got the coupling " + name +
+                           " (its force is that of the joints that it couples)");
+    }
+    return Fail(row, "joint: expected the name of a joint (" + Names(scene_.scene.joints) +
+                         "), got \"" + name + "\"");
+  }
+
+  bool FindContact(int row, const std::string& name, Observation* observation) {
+    const size_t colon = name.find(':');
+    bool found = colon != std::string::npos;
+    for (int k = 0; k < 2 && found; ++k) {
+      const std::string body = k == 0 ? name.substr(0, colon) : name.substr(colon + 1);
+      observation->pair[k] = FindTarget(scene_.scene, {}, body).body;
+      found = observation->pair[k] >= 0;
+    }
+    return (found && observation->pair[0] != observation->pair[1]) ||
+           Fail(row, "contact: expected the names of two bodies (" + BodyNames(scene_.scene) +
+                         ") as \"a:b\", got \"" + name + "\"");
+  }
+
   bool Fail(int row, const std::string& what) {
     *error_ = OneLine(table_.file + ": line " + std::to_string(table_.lines[row]) + ": " + what);
     return false;
@@ -105,8 +165,10 @@ class RowReader {
   }
 
   bool FindObserved(int row, Observation* observation) {
-    const std::string& name = table_.rows[row][table_.Column(by_point_ ? "point" : "body")];
-    if (by_point_) {
+    const std::string& name = table_.rows[row][table_.Column(NameOf(target_))];
+    if (target_ == Target::kJoint) return FindJoint(row, name, observation);
+    if (target_ == Target::kContact) return FindContact(row, name, observation);
+    if (target_ == Target::kPoint) {
       for (size_t i = 0; i < scene_.points.size(); ++i) {
         if (scene_.points[i].name == name) {
           observation->point = static_cast<int>(i);
@@ -141,14 +203,16 @@ class RowReader {
   const ObservationOptions& options_;
   std::vector<Channel>* channels_;
   std::string* error_;
-  bool by_point_ = false;
+  Target target_ = Target::kBody;
+  int num_targets_ = 0;
   int relative_to_ = -1;
 };
 
 const std::vector<std::string>& AllowedColumns() {
   static const std::vector<std::string> columns = {
-      "time", "body",  "point",    "relative_to", "x",  "y",     "angle", "vx",
-      "vy",   "omega", "distance", "ax",          "ay", "alpha", "event", "number"};
+      "time",  "body", "point",  "joint",  "contact",  "relative_to", "x",     "y",
+      "angle", "vx",   "vy",     "omega",  "distance", "ax",          "ay",    "alpha",
+      "fx",    "fy",   "torque", "normal", "tangent",  "event",       "number"};
   return columns;
 }
 
@@ -232,6 +296,13 @@ const char* UnitOf(Coordinate coordinate) {
       return "m/s^2";
     case Coordinate::kAlpha:
       return "rad/s^2";
+    case Coordinate::kFx:
+    case Coordinate::kFy:
+    case Coordinate::kNormal:
+    case Coordinate::kTangent:
+      return "N";
+    case Coordinate::kTorque:
+      return "N m";
     case Coordinate::kTime:
       return "s";
   }
@@ -239,7 +310,8 @@ const char* UnitOf(Coordinate coordinate) {
 }
 
 double ObservationSigma::Of(Coordinate coordinate) const {
-  const double all[kCoordinates] = {x, y, angle, vx, vy, omega, distance, ax, ay, alpha};
+  const double all[kCoordinates] = {x,  y,     angle, vx, vy,     omega,  distance, ax,
+                                    ay, alpha, fx,    fy, torque, normal, tangent};
   return all[static_cast<size_t>(coordinate)];
 }
 
@@ -267,6 +339,11 @@ std::string PointNames(const std::vector<BodyPoint>& points) { return Names(poin
 std::string BodyNames(const Scene& scene) { return Names(scene.bodies); }
 
 std::string TargetName(const ObservedScene& scene, const Observation& observation) {
+  if (observation.joint >= 0) return scene.scene.joints[observation.joint].name;
+  if (IsForce(observation.coordinate)) {
+    return scene.scene.bodies[observation.pair[0]].name + ":" +
+           scene.scene.bodies[observation.pair[1]].name;
+  }
   return observation.event >= 0   ? scene.instruments.events[observation.event].name
          : observation.point >= 0 ? scene.points[observation.point].name
                                   : scene.scene.bodies[observation.body].name;
@@ -308,11 +385,12 @@ std::string ReferenceName(const Scene& scene, const std::vector<BodyPoint>& poin
 ObservationSeries IndexSeries(const std::vector<Observation>& observations) {
   ObservationSeries series;
   series.of.reserve(observations.size());
-  std::map<std::tuple<int, int, int, Coordinate, int>, int> known;
+  std::map<std::tuple<int, int, int, Coordinate, int, int, int, int>, int> known;
   for (size_t i = 0; i < observations.size(); ++i) {
     const Observation& observation = observations[i];
     const std::tuple key(observation.channel, observation.body, observation.point,
-                         observation.coordinate, observation.event);
+                         observation.coordinate, observation.event, observation.joint,
+                         observation.pair[0], observation.pair[1]);
     const auto [place, inserted] = known.try_emplace(key, series.size());
     if (inserted) {
       series.first.push_back(static_cast<int>(i));

@@ -10,7 +10,10 @@
 // be measured more than once. The angle and its rates of a point are those of its body. A relative
 // coordinate is the difference to the other body or point, in the world's directions. Accelerations
 // `ax`, `ay` (m/s²), `alpha` (rad/s²) are measured by what sits there (acceleration.h), without a
-// camera or reference. A file of events has columns `time`, `event` (a name), `number` (from 1).
+// camera or reference. With a column `joint` the coordinates are `fx`, `fy` (N) and `torque` (N m),
+// the force of bodies[1] on bodies[0] and its torque about the anchor; with a column `contact`
+// ("a:b") `normal` and `tangent` (N, on the first body along t): force_rows.h. A file of events has
+// columns `time`, `event` (a name), `number` (from 1).
 
 #include <string>
 #include <vector>
@@ -21,15 +24,40 @@
 namespace tangible {
 
 /// The time of an event comes after the coordinates, which are columns of a file.
-enum class Coordinate { kX, kY, kAngle, kVx, kVy, kOmega, kDistance, kAx, kAy, kAlpha, kTime };
-inline constexpr int kCoordinates = 10;
+enum class Coordinate {
+  kX,
+  kY,
+  kAngle,
+  kVx,
+  kVy,
+  kOmega,
+  kDistance,
+  kAx,
+  kAy,
+  kAlpha,
+  kFx,
+  kFy,
+  kTorque,
+  kNormal,
+  kTangent,
+  kTime
+};
+inline constexpr int kCoordinates = 15;
+/// The first of these are coordinates of bodies and points.
+inline constexpr int kBodyCoordinates = 10;
 
-/// "x", "y", "angle", "vx", "vy", "omega", "distance", "ax", "ay", "alpha", "time".
+/// "x", "y", "angle", "vx", "vy", "omega", "distance", "ax", "ay", "alpha", "fx", "fy", "torque",
+/// "normal", "tangent", "time".
 const char* NameOf(Coordinate coordinate);
 
 inline bool IsAcceleration(Coordinate coordinate) {
   return coordinate == Coordinate::kAx || coordinate == Coordinate::kAy ||
          coordinate == Coordinate::kAlpha;
+}
+
+/// Of a joint or a contact.
+inline bool IsForce(Coordinate coordinate) {
+  return coordinate >= Coordinate::kFx && coordinate <= Coordinate::kTangent;
 }
 
 /// A point fixed in a body: r = position + R(angle) at.
@@ -42,14 +70,16 @@ struct BodyPoint {
 /// One measured coordinate.
 struct Observation {
   double time = 0.0;  ///< s, by the recording's clock; without one: in the run
-  int body = -1;
-  int point = -1;  ///< index into the points; −1: the body's centre of mass
+  int body = -1;      ///< −1: of a force
+  int point = -1;     ///< index into the points; −1: the body's centre of mass
   Coordinate coordinate = Coordinate::kX;
-  double value = 0.0;  ///< m, rad, m/s or rad/s; through a camera lengths are in its units
-  double sigma = 1.0;  ///< the same: standard deviation of its noise
-  int channel = 0;     ///< index into the channels
-  int event = -1;      ///< index into the instruments' events; −1: a coordinate is measured
-  int number = 1;      ///< of the event in the run, from 1
+  double value = 0.0;      ///< m, rad, m/s or rad/s; through a camera lengths are in its units
+  double sigma = 1.0;      ///< the same: standard deviation of its noise
+  int channel = 0;         ///< index into the channels
+  int event = -1;          ///< index into the instruments' events; −1: a coordinate is measured
+  int number = 1;          ///< of the event in the run, from 1
+  int joint = -1;          ///< of a force: index into the scene's joints; −1: of a contact
+  int pair[2] = {-1, -1};  ///< of a contact's force: its bodies
 };
 
 /// Observations of the same coordinate of the same body or point by the same channel.
@@ -74,6 +104,11 @@ struct ObservationSigma {
   double ax = 1.0;                  ///< m/s²
   double ay = 1.0;                  ///< m/s²
   double alpha = 1.0;               ///< rad/s²
+  double fx = 1.0;                  ///< N
+  double fy = 1.0;                  ///< N
+  double torque = 1.0;              ///< N m
+  double normal = 1.0;              ///< N
+  double tangent = 1.0;             ///< N
   std::vector<double> events = {};  ///< s, one for each of the instruments' events
 
   double Of(Coordinate coordinate) const;
@@ -107,7 +142,7 @@ std::string BodyNames(const Scene& scene);
 std::string ReferenceName(const Scene& scene, const std::vector<BodyPoint>& points,
                           const Channel& channel);
 
-/// "m", "rad", "m/s", "rad/s", "m/s^2", "rad/s^2" or "s".
+/// "m", "rad", "m/s", "rad/s", "m/s^2", "rad/s^2", "N", "N m" or "s".
 const char* UnitOf(Coordinate coordinate);
 
 /// The scene, points and instruments to which observations refer.
@@ -117,7 +152,7 @@ struct ObservedScene {
   const Instruments& instruments;
 };
 
-/// The name of the observed point, body or event.
+/// The name of the observed point, body, joint, contact ("a:b") or event.
 std::string TargetName(const ObservedScene& scene, const Observation& observation);
 
 /// False, with one line about it, where a recorded time is outside of the run; a time that the run

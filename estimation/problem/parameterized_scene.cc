@@ -156,8 +156,14 @@ bool ParameterizedScene::Finish(ParameterError* error) {
                   (reason.empty() ? "" : ": " + reason)};
     return false;
   }
-  const std::string refused =
-      structure_->paths.empty() ? "" : CoincidingEdges(model_, VariableDerivatives());
+  const std::string rates = CoupledRatesFault(scene_, "the scene with the initial values");
+  if (!rates.empty()) {
+    *error = {-1, -1, "", rates};
+    return false;
+  }
+  const std::string refused = structure_->paths.empty() && !structure_->has_releases
+                                  ? ""
+                                  : CoincidingEdges(model_, VariableDerivatives());
   if (!refused.empty()) *error = {-1, -1, "", refused};
   return refused.empty();
 }

@@ -119,7 +119,10 @@ bool RolloutResiduals::UpdateTimes() {
     AddStepTimes(SplitTimes(sampled, settings, sample_options_), &settings);
   }
   plan_ = SamplePlan(observations_, times, channels_, markers_, settings, sample_options_);
-  if (!HasEvents()) settings.duration = StepTime(settings, plan_.last_step());
+  forces_ = ForceRows(observations_, times, settings);
+  if (!HasEvents()) {
+    settings.duration = StepTime(settings, std::max(plan_.last_step(), forces_.last_step()));
+  }
   std::vector<double>& ends = settings.step_times;
   ends.erase(std::upper_bound(ends.begin(), ends.end(), settings.duration), ends.end());
   scene_.SetSimulation(settings);
@@ -284,6 +287,10 @@ bool RolloutResiduals::SetParameters(const Eigen::VectorXd& p) {
     message_ = "a parameter sets a number to a value that it may not take";
     return false;
   }
+  if (scene_.MovesTimes() && forces_.num_rows() > 0) {
+    message_ = "forces are observed, which have no derivative by a delay or clock";
+    return false;
+  }
   if (scene_.MovesTimes() && !UpdateTimes()) {
     return false;
   }
@@ -310,6 +317,7 @@ bool RolloutResiduals::Plain() {
       [this](long k, double, const State<double>& state, Stepper* stepper) {
         plan_.Add(k, state, &samples_, &rates_);
         event_times_.Add(k, stepper);
+        AddForces(k, stepper);
       },
       &final));
   if (done) FinishEvents(final);
@@ -322,8 +330,17 @@ bool RolloutResiduals::Tangent(RowMatrixXd* jacobian) {
   State<double> final;
   Stepper stepper(scene_.model());
   event_times_.Start();
+  RowMatrixXd last_dots;  // of the state before, where forces read it
   const TangentObserver observer = [&](long k, double, const State<double>& state,
                                        const RowMatrixXd& dots) {
+    AddForces(k, k == 0 ? nullptr : &stepper);
+    forces_.ForEachDot(
+        k, num_parameters(), [&](int variable) { return last_dots.row(variable); },
+        [&](int variable) { return dots.row(variable); },
+        [&](int row, const Eigen::RowVectorXd& dot) {
+          sample_derivatives.row(ForceRow(row)) = dot;
+        });
+    if (forces_.ReadsAt(k + 1)) last_dots = dots;
     plan_.Add(k, state, &samples_, &rates_);
     plan_.numbers().AddTangent(k, *scene_.model().structure, dots, &sample_derivatives);
     event_times_.Add(k, k == 0 ? nullptr : &stepper);
@@ -347,6 +364,7 @@ bool RolloutResiduals::Adjoint(RowMatrixXd* jacobian) {
                                         Stepper* stepper) {
     plan_.Add(k, state, &samples_, &rates_);
     event_times_.Add(k, stepper);
+    AddForces(k, stepper);
   };
   if (!Accept(tape_.Record(scene_.model(), scene_.initial_state(), Factorisations::kKeep, observer,
                            &final))) {
@@ -371,7 +389,14 @@ void RolloutResiduals::AdjointBlock(int first, int count, const RowMatrixXd& var
   std::vector<std::vector<Reader>> readers(plan_.num_samples());
   long last = 0;  // the step that is read
   EventBars events;
+  std::vector<std::pair<int, int>> forces;  // the losses that read forces, and their rows
   for (int i = 0; i < count; ++i) {
+    if (const int row = forces_.RowOf(first + i); row >= 0) {
+      forces.emplace_back(i, row);
+      last = std::max(last, forces_.StateOf(row));
+      jacobian->row(first + i) = ForceDirectTerm(first + i, forces_.Value(row));
+      continue;
+    }
     if (observations_[first + i].event >= 0) {
       AddEventBars(first + i, i, &events);
       const Eigen::Index row = EventRow(event_times_.RowOf(first + i));
@@ -399,6 +424,13 @@ void RolloutResiduals::AdjointBlock(int first, int count, const RowMatrixXd& var
   last = std::max(last, events.LastStep(end));
   const auto seed = [&](long k, RowMatrixXd* w_bar) {
     if (k == end) events.AddAtEnd(w_bar);
+    for (const auto& [loss, row] : forces) {
+      if (forces_.StateOf(row) != k) continue;
+      const double factor = GainOf(first + loss) / observations_[first + loss].sigma;
+      for (const JacobianEntry& entry : forces_.ByState(row)) {
+        (*w_bar)(entry.variable, loss) += factor * entry.value;
+      }
+    }
     plan_.numbers().ForEachBar(k, structure, [&](int row, double weight, int variable) {
       for (const Reader& reader : readers[row / plan_.width()]) {
         (*w_bar)(variable, reader.loss) += weight * reader.by_state[row % plan_.width()];
@@ -446,7 +478,7 @@ bool RolloutResiduals::FiniteDifferences(const Eigen::VectorXd& p, RowMatrixXd* 
 bool RolloutResiduals::IsDirect(int i) const {
   const Observation& one = observations_[i];
   return one.point < 0 && one.event < 0 && !IsAcceleration(one.coordinate) &&
-         !IsRecorded(ChannelOf(one));
+         !IsForce(one.coordinate) && !IsRecorded(ChannelOf(one));
 }
 
 Eigen::Index RolloutResiduals::DirectNumber(int i) const {
@@ -568,6 +600,11 @@ Eigen::VectorXd RolloutResiduals::FromSamples(const std::vector<double>& samples
       residuals[i] = (predicted - observations_[i].value) / observations_[i].sigma;
       continue;
     }
+    if (const int row = forces_.RowOf(i); row >= 0) {
+      const double force = RecordedForce(i, samples[static_cast<size_t>(ForceRow(row))]);
+      residuals[i] = (force - observations_[i].value) / observations_[i].sigma;
+      continue;
+    }
     if (observations_[i].event >= 0) {
       const auto row = static_cast<size_t>(EventRow(event_times_.RowOf(i)));
       residuals[i] =
@@ -589,6 +626,13 @@ RowMatrixXd RolloutResiduals::FromSampleDerivatives(const std::vector<double>& s
   for (int i = 0; i < num_residuals(); ++i) {
     if (IsDirect(i)) {
       jacobian.row(i) = sample_derivatives.row(DirectNumber(i)) / observations_[i].sigma;
+      continue;
+    }
+    if (const int force = forces_.RowOf(i); force >= 0) {
+      const Eigen::Index row = ForceRow(force);
+      jacobian.row(i) = GainOf(i) / observations_[i].sigma * sample_derivatives.row(row);
+      jacobian.row(i).head(num_parameters()) +=
+          ForceDirectTerm(i, samples[static_cast<size_t>(row)]).cwiseProduct(p_by_q.transpose());
       continue;
     }
     if (observations_[i].event >= 0) {

@@ -23,6 +23,7 @@
 #include <vector>
 
 #include "tangible/estimation/problem/event_times.h"
+#include "tangible/estimation/problem/force_rows.h"
 #include "tangible/estimation/problem/least_squares.h"
 #include "tangible/estimation/problem/measurement.h"
 #include "tangible/estimation/problem/parameterized_scene.h"
@@ -52,9 +53,11 @@ class RolloutResiduals : public LeastSquaresProblem {
   const SamplePlan& plan() const { return plan_; }
   /// Whether times of events are observed.
   bool HasEvents() const { return event_times_.num_rows() > 0; }
-  /// Whether what is observed needs the whole run: an event's number counts from its start, and an
-  /// acceleration is that between two states.
-  bool NeedsWholeRun() const { return HasEvents() || sample_options_.accelerations; }
+  /// Whether what is observed needs the whole run: an event's number counts from its start, an
+  /// acceleration is that between two states, and a force that of a step.
+  bool NeedsWholeRun() const {
+    return HasEvents() || sample_options_.accelerations || forces_.num_rows() > 0;
+  }
   /// Names of the observations' files, by Channel::file; empty where there are none.
   const std::vector<std::string>& files() const { return files_; }
   void SetFiles(std::vector<std::string> files) { files_ = std::move(files); }
@@ -117,8 +120,9 @@ class RolloutResiduals : public LeastSquaresProblem {
 
  private:
   void NameSamplesOnImpacts(Certificate* certificate) const;
-  /// Those of the samples, then the times of events.
-  Eigen::Index num_sample_rows() const { return EventRow(0) + event_times_.num_rows(); }
+  /// Those of the samples, then the times of events, then forces.
+  Eigen::Index num_sample_rows() const { return ForceRow(forces_.num_rows()); }
+  Eigen::Index ForceRow(int row) const { return EventRow(event_times_.num_rows()) + row; }
   Eigen::Index EventRow(int row) const {
     return plan_.width() * static_cast<Eigen::Index>(plan_.num_samples()) + row;
   }
@@ -132,6 +136,12 @@ class RolloutResiduals : public LeastSquaresProblem {
   double RecordedTime(int i, double time) const;
   Eigen::RowVectorXd EventDirectTerm(int i, double time) const;
   std::vector<std::string> DescribeMissingEvents();
+  /// Reads the forces that the step before the state after k steps has.
+  void AddForces(long k, Stepper* stepper);
+  /// The gain of what recorded a force.
+  double GainOf(int i) const;
+  double RecordedForce(int i, double force) const;
+  Eigen::RowVectorXd ForceDirectTerm(int i, double force) const;
   bool Accept(const RolloutReport& report);
   bool Plain();
   bool Tangent(RowMatrixXd* jacobian);
@@ -164,6 +174,7 @@ class RolloutResiduals : public LeastSquaresProblem {
   SampleOptions sample_options_;
   SamplePlan plan_;
   EventTimes event_times_;
+  ForceRows forces_;
   RowMatrixXd by_gravity_;  ///< d gravity / d p, where accelerations are observed
   std::vector<std::string> files_;
   std::vector<double> samples_;  ///< plan_.width() numbers each

@@ -81,7 +81,7 @@ SamplePlan::SamplePlan(const std::vector<Observation>& observations,
       std::any_of(markers.begin(), markers.end(), [](int marker) { return marker >= 0; });
   sample_of_.reserve(observations.size());
   for (size_t i = 0; i < observations.size(); ++i) {
-    if (observations[i].event >= 0) {  // no sample is read
+    if (observations[i].event >= 0 || IsForce(observations[i].coordinate)) {  // no sample is read
       sample_of_.push_back(-1);
       if (any_others) others_.insert(others_.end(), 2, -1);
       continue;

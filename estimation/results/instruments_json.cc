@@ -72,7 +72,8 @@ int ReadIndex(const JsonReader& json, const char* key, const Items& items) {
 ObservationSigma SameSigma(double all, const std::vector<ObservedEvent>& events) {
   ObservationSigma sigma;
   for (double* value : {&sigma.x, &sigma.y, &sigma.angle, &sigma.vx, &sigma.vy, &sigma.omega,
-                        &sigma.distance, &sigma.ax, &sigma.ay, &sigma.alpha}) {
+                        &sigma.distance, &sigma.ax, &sigma.ay, &sigma.alpha, &sigma.fx, &sigma.fy,
+                        &sigma.torque, &sigma.normal, &sigma.tangent}) {
     *value = all;
   }
   sigma.events.assign(events.size(), all);
@@ -82,9 +83,10 @@ ObservationSigma SameSigma(double all, const std::vector<ObservedEvent>& events)
 ObservationSigma ReadSigma(const JsonReader& json, const std::vector<ObservedEvent>& events) {
   if (!json.IsObject()) return SameSigma(json.Number(NumberKind::kPositive), events);
   ObservationSigma sigma;
-  double* const values[kCoordinates] = {&sigma.x,  &sigma.y,     &sigma.angle,    &sigma.vx,
-                                        &sigma.vy, &sigma.omega, &sigma.distance, &sigma.ax,
-                                        &sigma.ay, &sigma.alpha};
+  double* const values[kCoordinates] = {&sigma.x,      &sigma.y,      &sigma.angle,    &sigma.vx,
+                                        &sigma.vy,     &sigma.omega,  &sigma.distance, &sigma.ax,
+                                        &sigma.ay,     &sigma.alpha,  &sigma.fx,       &sigma.fy,
+                                        &sigma.torque, &sigma.normal, &sigma.tangent};
   std::vector<std::string> keys;
   keys.reserve(kCoordinates + events.size());
   for (int i = 0; i < kCoordinates; ++i) keys.emplace_back(NameOf(static_cast<Coordinate>(i)));

@@ -41,7 +41,8 @@ std::string SensorOf(const RolloutResiduals& residuals, const Observation& obser
 
 std::string UnitOf(const RolloutResiduals& residuals, const Observation& observation) {
   const bool is_length = observation.coordinate != Coordinate::kAngle &&
-                         observation.coordinate != Coordinate::kOmega && observation.event < 0;
+                         observation.coordinate != Coordinate::kOmega &&
+                         !IsForce(observation.coordinate) && observation.event < 0;
   const bool is_rate =
       observation.coordinate == Coordinate::kVx || observation.coordinate == Coordinate::kVy;
   if (residuals.ChannelOf(observation).camera >= 0 && is_length) {
@@ -72,7 +73,11 @@ SeriesSummary Describe(const RolloutResiduals& residuals, const std::string& rec
   series.file = FileOf(residuals, observation);
   series.target =
       TargetName({scene, residuals.scene().points(), residuals.scene().instruments()}, observation);
-  series.kind = observation.event >= 0 ? "event" : observation.point >= 0 ? "point" : "body";
+  series.kind = observation.event >= 0            ? "event"
+                : observation.joint >= 0          ? "joint"
+                : IsForce(observation.coordinate) ? "contact"
+                : observation.point >= 0          ? "point"
+                                                  : "body";
   series.relative_to =
       ReferenceName(scene, residuals.scene().points(), residuals.ChannelOf(observation));
   series.sensor = SensorOf(residuals, observation);

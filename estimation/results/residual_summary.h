@@ -19,8 +19,8 @@ namespace tangible {
 struct SeriesSummary {
   std::string recording;    ///< empty: the only one
   std::string file;         ///< empty where the observations are of no file
-  std::string target;       ///< body, point or event
-  std::string kind;         ///< "body", "point" or "event"
+  std::string target;       ///< body, point, joint, contact or event
+  std::string kind;         ///< "body", "point", "joint", "contact" or "event"
   std::string relative_to;  ///< empty: to the world
   std::string sensor;       ///< empty: none
   std::string unit;         ///< of rms and mean

@@ -235,14 +235,16 @@ class RunReader {
     return link;
   }
 
+  static bool MovesTimes(const std::string& path) {
+    return path.rfind("clocks/", 0) == 0 ||
+           (path.rfind("sensors/", 0) == 0 && path.find("/delay") != std::string::npos);
+  }
+
   /// The states at the ends of segments are at times that stand still.
   void CheckShooting() {
     for (const FitParameter& parameter : problem_->parameters) {
       for (const ParameterSet& set : parameter.sets) {
-        const bool moves_times =
-            set.path.rfind("clocks/", 0) == 0 ||
-            (set.path.rfind("sensors/", 0) == 0 && set.path.find("/delay") != std::string::npos);
-        if (moves_times && problem_->options.segments > 1) {
+        if (MovesTimes(set.path) && problem_->options.segments > 1) {
           root_.At("segments")
               .Fail("expected 1 where a delay or clock is a parameter (" + set.path + "), got " +
                     std::to_string(problem_->options.segments));
@@ -252,15 +254,31 @@ class RunReader {
     }
   }
 
+  /// Forces have no derivative by their time.
+  void CheckForceTimes() {
+    const auto is_force = [](const Observation& one) { return IsForce(one.coordinate); };
+    if (std::none_of(problem_->observations.begin(), problem_->observations.end(), is_force))
+      return;
+    for (size_t i = 0; i < problem_->parameters.size(); ++i) {
+      for (const ParameterSet& set : problem_->parameters[i].sets) {
+        if (!MovesTimes(set.path)) continue;
+        root_.At("parameters")
+            .At(static_cast<int>(i))
+            .Fail("expected no delay or clock where forces are observed, got " + set.path);
+        return;
+      }
+    }
+  }
+
   /// As RolloutResiduals::NeedsWholeRun.
   void CheckWholeRun() {
     const auto needs_whole = [](const Observation& one) {
-      return one.event >= 0 || IsAcceleration(one.coordinate);
+      return one.event >= 0 || IsAcceleration(one.coordinate) || IsForce(one.coordinate);
     };
     if (problem_->options.segments > 1 &&
         std::any_of(problem_->observations.begin(), problem_->observations.end(), needs_whole)) {
       root_.At("segments")
-          .Fail("expected 1 where times of events or accelerations are observed, got " +
+          .Fail("expected 1 where times of events, accelerations or forces are observed, got " +
                 std::to_string(problem_->options.segments));
     }
   }
@@ -309,6 +327,7 @@ class RunReader {
       }
     }
     if (root_.ok()) CheckWholeRun();
+    if (root_.ok()) CheckForceTimes();
     if (is_part && root_.ok()) Cut();
     return true;
   }

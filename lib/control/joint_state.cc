@@ -41,8 +41,7 @@ void JointState::ProjectTwists(State<double>* state) const {
   Eigen::Index at = 0;
   for (const JointIndex& joint : s.joints) {
     JointRows<double> of;
-    EvaluateJoint(joint.type, state->PoseOf(joint.a), state->PoseOf(joint.b),
-                  &model_.parameters[joint.geometry], &of);
+    EvaluateJoint(model_, *state, joint, &of);
     for (int k = 0; k < of.rows; ++k, ++at) {
       rates[at] = 0.0;
       for (const auto& [body, row] : {std::pair(joint.a, of.row_a[k]), {joint.b, of.row_b[k]}}) {

@@ -87,8 +87,7 @@ void AddContacts(double t, double length, const Stepper& stepper, Table* table) 
 JointRows<double> RowsOf(const Model<double>& model, const State<double>& state,
                          const JointIndex& joint) {
   JointRows<double> rows;
-  EvaluateJoint(joint.type, state.PoseOf(joint.a), state.PoseOf(joint.b),
-                &model.parameters[joint.geometry], &rows);
+  EvaluateJoint(model, state, joint, &rows);
   return rows;
 }
 

@@ -23,4 +23,29 @@ enum class JointPlace {
 template <typename T>
 std::vector<JointPlace> ClassifyJoints(const BasicScene<T>& scene);
 
+/// The bodies on the bodies[0] side of a joint of a tree.
+template <typename T>
+std::vector<bool> SubtreeOfJoint(const BasicScene<T>& scene, int joint) {
+  std::vector<bool> inside(scene.bodies.size(), false);
+  inside[scene.joints[joint].bodies[0]] = true;
+  // The set spreads over the other joints until nothing changes. This takes quadratic time, which
+  // is affordable because a scene is built once.
+  for (bool changed = true; changed;) {
+    changed = false;
+    for (size_t k = 0; k < scene.joints.size(); ++k) {
+      const int a = scene.joints[k].bodies[0];
+      const int b = scene.joints[k].bodies[1];
+      const auto moves = [&](int body) {
+        return body >= 0 && scene.bodies[body].motion == Motion::kMoving;
+      };
+      if (static_cast<int>(k) == joint || !moves(a) || !moves(b) || inside[a] == inside[b]) {
+        continue;
+      }
+      inside[a] = inside[b] = true;
+      changed = true;
+    }
+  }
+  return inside;
+}
+
 }  // namespace tangible

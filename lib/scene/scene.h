@@ -157,6 +157,7 @@ struct BasicJoint {
   T effort{0.0};
   std::optional<Signal> effort_signal;        ///< replaces effort
   std::optional<BasicServo<T>> effort_servo;  ///< replaces effort
+  std::optional<T> until;                     ///< s: from then on the joint does nothing
   bool contact = false;                       ///< whether the joined bodies may collide
 };
 

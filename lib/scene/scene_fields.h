@@ -218,6 +218,7 @@ void VisitJoint(Joint& joint, bool turns, Visitor* visitor) {
   constexpr NumberKind kFree = NumberKind::kFree;
   constexpr NumberKind kNonNegative = NumberKind::kNonNegative;
   const bool slides = joint.type == JointType::kPrismatic;
+  visitor->Optional({"until", kFree, Dimension::kTime}, joint.until);
   if (joint.type == JointType::kCoupling) {
     visitor->Number({"ratio", kFree, Dimension::kNone, true}, joint.ratio);
     VisitLimits(joint, kFree, Dimension::kNone, visitor);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/scene/validate.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <limits>
@@ -10,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "tangible/math/planar.h"
 #include "tangible/scene/coupling.h"
 #include "tangible/scene/joint_graph.h"
 #include "tangible/scene/scene_fields.h"
@@ -226,39 +228,104 @@ void CheckCouplings(const Scene& scene, const JsonReader& joints) {
       return place.Fail("expected two different joints, got " +
                         scene.joints[joint.coupled[0]].name + " twice");
     }
-    const std::string fault = FormOf(scene, joint).fault;
+    const std::string fault = EndsOf(scene, joint).fault;
     if (!fault.empty()) return place.Fail(fault);
   }
 }
 
+namespace {
+
+// The sum of terms, and of their magnitudes.
+struct RateSum {
+  double sum = 0.0, size = 0.0;
+  void Add(double term) {
+    sum += term;
+    size += std::abs(term);
+  }
+};
+
+// The terms of a body's velocity at a point of the plane along a direction: as drawn.
+void AddDrawn(const Scene& scene, int body, const Vector2<double>& along,
+              const Vector2<double>& point, double factor, RateSum* rates) {
+  if (body < 0) return;
+  const BasicBody<double>& of = scene.bodies[body];
+  rates->Add(factor * along.dot(of.velocity));
+  rates->Add(factor * of.angular_velocity * along.dot(Perp(Vector2<double>(point - of.position))));
+}
+
+// The terms that the rates of joints add to it, in a scene whose joints start as drawn.
+void AddTurned(const Scene& scene, int body, const Vector2<double>& along,
+               const Vector2<double>& point, double factor, RateSum* rates) {
+  if (body < 0) return;
+  const std::vector<JointPlace> places = ClassifyJoints(scene);
+  for (std::size_t k = 0; k < scene.joints.size(); ++k) {
+    const BasicJoint<double>& joint = scene.joints[k];
+    const bool has_rate = joint.rate != 0.0 && places[k] == JointPlace::kTree;
+    if (!has_rate || !SubtreeOfJoint(scene, static_cast<int>(k))[body]) continue;
+    const double speed = joint.type == JointType::kPrismatic
+                             ? along.dot(joint.axis) / joint.axis.norm()
+                             : along.dot(Perp(Vector2<double>(point - joint.anchors[0])));
+    rates->Add(factor * joint.rate * speed);
+  }
+}
+
+// The terms of the rate of a joint's coordinate at time 0, times a factor. Rates of other joints
+// change the distance of a rope's ends, but not the coordinate of a hinge or slider.
+void AddCoordinateRate(const Scene& scene, const BasicJoint<double>& joint, double factor,
+                       RateSum* rates) {
+  const auto& [a, b] = joint.bodies;
+  if (joint.type == JointType::kRevolute) {
+    rates->Add(factor * joint.rate);
+    if (a >= 0) rates->Add(factor * scene.bodies[a].angular_velocity);
+    if (b >= 0) rates->Add(-factor * scene.bodies[b].angular_velocity);
+  } else if (joint.type == JointType::kPrismatic) {
+    const Vector2<double> axis = joint.axis / joint.axis.norm();
+    rates->Add(factor * joint.rate);
+    AddDrawn(scene, a, axis, joint.anchors[0], factor, rates);
+    AddDrawn(scene, b, axis, joint.anchors[0], -factor, rates);
+  } else {
+    const Vector2<double> apart = joint.anchors[0] - joint.anchors[1];
+    const double length = apart.norm();
+    const Vector2<double> along = length > 0.0 ? apart / length : Vector2<double>(1.0, 0.0);
+    AddDrawn(scene, a, along, joint.anchors[0], factor, rates);
+    AddDrawn(scene, b, along, joint.anchors[1], -factor, rates);
+    AddTurned(scene, a, along, joint.anchors[0], factor, rates);
+    AddTurned(scene, b, along, joint.anchors[1], -factor, rates);
+  }
+}
+
+}  // namespace
+
 void CheckCoupledRates(const Scene& scene, const JsonReader& joints) {
+  const bool is_turned = std::any_of(scene.joints.begin(), scene.joints.end(),
+                                     [](const auto& joint) { return joint.angle != 0.0; });
   for (std::size_t i = 0; i < scene.joints.size(); ++i) {
     const BasicJoint<double>& coupling = scene.joints[i];
     if (coupling.type != JointType::kCoupling || coupling.limits) continue;
-    // The rates of coordinates: those of the bodies as drawn, which other joints' rates do not
-    // change, and the joint's own.
-    const CouplingForm<double> form = FormOf(scene, coupling);
-    const double rates[2] = {scene.joints[coupling.coupled[0]].rate,
-                             coupling.ratio * scene.joints[coupling.coupled[1]].rate};
-    double sum = rates[0] + rates[1];
-    double size = std::abs(rates[0]) + std::abs(rates[1]);
-    bool follows_path = false;
+    RateSum rates;
+    bool is_known = true;
     for (int k = 0; k < 2; ++k) {
-      const BasicBody<double>& body = scene.bodies[form.bodies[k]];
-      follows_path = follows_path || body.driven.has_value();
-      const double twist[3] = {body.velocity.x(), body.velocity.y(), body.angular_velocity};
-      for (int c = 0; c < 3; ++c) {
-        sum += form.row[k][c] * twist[c];
-        size += std::abs(form.row[k][c] * twist[c]);
+      const BasicJoint<double>& joint = scene.joints[coupling.coupled[k]];
+      // Where joints start turned, the anchors of a rope are not yet where the run starts.
+      is_known = is_known && !(is_turned && joint.type == JointType::kDistance);
+      for (const int body : joint.bodies) {
+        is_known = is_known && (body < 0 || !scene.bodies[body].driven);
       }
+      AddCoordinateRate(scene, joint, k == 0 ? 1.0 : coupling.ratio, &rates);
     }
-    if (follows_path || std::abs(sum) <= kCoupledRates * size) continue;
+    if (!is_known || std::abs(rates.sum) <= kCoupledRates * rates.size) continue;
     joints.At(static_cast<int>(i))
         .Fail("expected initial rates with rate(" + scene.joints[coupling.coupled[0]].name +
               ") + ratio * rate(" + scene.joints[coupling.coupled[1]].name + ") = 0, got " +
-              Json(sum).dump());
+              Json(rates.sum).dump());
     return;
   }
+}
+
+std::string CoupledRatesFault(const Scene& scene, const std::string& name) {
+  JsonErrors errors(name);
+  CheckCoupledRates(scene, JsonReader::Nothing(&errors).At("joints"));
+  return errors.message();
 }
 
 void CheckForce(const BasicForce<double>& force, const JsonReader& place) {

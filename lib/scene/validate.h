@@ -33,8 +33,11 @@ void CheckRopes(const Scene& scene, const JsonReader& joints);
 /// Whether each coupling is of two joints that can be coupled (coupling.h).
 void CheckCouplings(const Scene& scene, const JsonReader& joints);
 /// Whether the initial rates obey the couplings that are kept, as CheckRopes where a scene is read:
-/// a fit may move a rate. Bodies that follow a recorded path are not looked at.
+/// a fit may move a rate. Bodies that follow a recorded path are not looked at, nor are ropes where
+/// joints start turned.
 void CheckCoupledRates(const Scene& scene, const JsonReader& joints);
+/// The same of a scene in memory: "" or one line, as Validate.
+std::string CoupledRatesFault(const Scene& scene, const std::string& name);
 
 /// Whether a path has the columns that are offset; only the reader of a scene demands this, because
 /// a number without an effect may be varied.

@@ -232,7 +232,8 @@ constexpr char kGears[] = R"({"bodies": [
     {"name": "q", "type": "revolute", "bodies": ["b", "world"], "anchor": [0, 0], "rate": -0.5},
     {"name": "r", "type": "revolute", "bodies": ["c", "b"], "anchor": [0, 0]},
     {"name": "s", "type": "prismatic", "bodies": ["c", "b"], "anchor": [0, 0], "axis": [1, 0]},
-    {"name": "w", "type": "fixed_angle", "bodies": ["c", "b"]}]})";
+    {"name": "w", "type": "fixed_angle", "bodies": ["c", "b"]},
+    {"name": "d", "type": "distance", "bodies": ["c", "b"], "anchors": [[0, 0], [1, 0]]}]})";
 
 TEST(BadSceneTest, Couplings) {
   Scene scene;
@@ -245,9 +246,14 @@ TEST(BadSceneTest, Couplings) {
       {"/joints/0/joints", "[\"p\", \"p\"]",
        "/joints/0/joints: expected two different joints, got p twice"},
       {"/joints/0/joints", "[\"p\", \"gear\"]",
-       "/joints/0/joints: expected revolute or prismatic joints, got gear, which is neither"},
+       "/joints/0/joints: expected revolute, prismatic or distance joints, got gear, which is none "
+       "of these"},
       {"/joints/0/joints", "[\"p\", \"w\"]",
-       "/joints/0/joints: expected revolute or prismatic joints, got w, which is neither"},
+       "/joints/0/joints: expected revolute, prismatic or distance joints, got w, which is none of "
+       "these"},
+      {"/joints/0/joints", "[\"p\", \"d\"]",
+       "/joints/0/joints: expected joints that move, got d, which keeps its distance ([0, null] as "
+       "its limits leaves it free)"},
       {"/joints/0/joints", "[\"p\", \"z\"]",
        "/joints/0/joints/1: expected the name of a joint, got \"z\""},
       {"/joints/0/joints", "[\"p\"]",
@@ -255,16 +261,17 @@ TEST(BadSceneTest, Couplings) {
       {"/joints/0/joints", kRemove,
        "/joints/0/joints: missing, expected an array of 2 names of joints"},
       {"/joints/0/joints", "[\"p\", \"r\"]",
-       "/joints/0/joints: expected joints that hold two moving bodies in all, got three or four"},
-      {"/joints/0/joints", "[\"q\", \"s\"]",
-       "/joints/0/joints: expected sliders against the world or a static body, got s between two "
-       "bodies that move"},
+       "/joints/0/joints: expected joints that hold at most two moving bodies in all, got three or "
+       "four"},
+      {"/joints/0/joints", "[\"p\", \"s\"]",
+       "/joints/0/joints: expected joints that hold at most two moving bodies in all, got three or "
+       "four"},
       {"/joints/2/rate", "0.5",
        "/joints/0: expected initial rates with rate(p) + ratio * rate(q) = 0, got 2.0"},
       {"/joints/0/ratio", kRemove, "/joints/0/ratio: missing, expected a number"},
       {"/joints/0/bodies", "[\"a\", \"b\"]",
        "/joints/0/bodies: unknown key of a coupling joint, expected one of name, type, joints, "
-       "contact, ratio, limits, limit_restitution, got \"bodies\""}};
+       "contact, until, ratio, limits, limit_restitution, got \"bodies\""}};
   for (const BadScene& c : cases) EXPECT_EQ(ErrorIn(kGears, c), "bad.json: " + c.message);
   // Play leaves the rates free.
   Json play = Json::parse(kGears);
@@ -296,23 +303,24 @@ TEST(BadSceneTest, Joints) {
        "coupling"},
       {"/joints/0/displacement", "0",
        "/joints/0/displacement: unknown key of a revolute joint, expected one of name, type, "
-       "bodies, contact, anchor, angle, rate, damping, limits, limit_restitution, friction, "
+       "bodies, contact, until, anchor, angle, rate, damping, limits, limit_restitution, friction, "
        "kinetic_friction, stribeck_speed, motor, stiffness, rest_angle, effort, got "
        "\"displacement\""},
       {"/joints/1/angle", "0",
        "/joints/1/angle: unknown key of a prismatic joint, expected one of name, type, bodies, "
-       "contact, anchor, axis, displacement, rate, damping, limits, limit_restitution, friction, "
+       "contact, until, anchor, axis, displacement, rate, damping, limits, limit_restitution, "
+       "friction, "
        "kinetic_friction, stribeck_speed, motor, stiffness, rest_displacement, effort, got "
        "\"angle\""},
       {"/joints/2/damping", "0",
        "/joints/2/damping: unknown key of a weld joint, expected one of name, type, bodies, "
-       "contact, anchor, got \"damping\""},
+       "contact, until, anchor, got \"damping\""},
       {"/joints/3/anchor", "[0, 0]",
        "/joints/3/anchor: unknown key of a distance joint, expected one of name, type, bodies, "
-       "contact, anchors, limits, limit_restitution, got \"anchor\""},
+       "contact, until, anchors, limits, limit_restitution, got \"anchor\""},
       {"/joints/4/anchor", "[0, 0]",
        "/joints/4/anchor: unknown key of a fixed_angle joint, expected one of name, type, bodies, "
-       "contact, got \"anchor\""},
+       "contact, until, got \"anchor\""},
       {"/joints/0/anchor", kRemove,
        "/joints/0/anchor: missing, expected an array of 2 numbers [x, y]"},
       {"/joints/1/axis", "[0, 0]", "/joints/1/axis: expected a direction, got the zero vector"},

@@ -73,6 +73,8 @@ void CoverForces(const Scene& scene, Coverage* coverage) {
     cover(joint.effort_servo.has_value(), "servo of a joint");
     cover(joint.limit_restitution.has_value(), "restitution of a limit");
     cover(joint.type == JointType::kDistance && joint.limits, "rope");
+    cover(joint.type == JointType::kCoupling && joint.limits, "coupling with limits");
+    cover(joint.until.has_value(), "end of a joint");
   }
   cover(!scene.springs.empty(), "spring");
   cover(scene.gravity.isZero(), "no gravity");
@@ -138,9 +140,7 @@ std::vector<std::string> ExpectedCoverage() {
     }
   }
   for (const auto& [name, type] : kJointTypeNames) {
-    // Random scenes draw no couplings, whose derivatives have tests of their own
-    // (tests/simulation/gradient/couplings_test.cc).
-    if (type != JointType::kCoupling) expected.push_back("joint " + std::string(name));
+    expected.push_back("joint " + std::string(name));
   }
   for (const auto& [name, mixing] : kMixingNames) {
     expected.push_back("mixing of friction " + std::string(name));
@@ -174,6 +174,8 @@ std::vector<std::string> ExpectedCoverage() {
                            "spring of a joint",
                            "friction in a joint",
                            "friction that decays",
+                           "coupling with limits",
+                           "end of a joint",
                            "point fixed in a body",
                            "drag of a body",
                            "spring",

@@ -6,6 +6,9 @@
 #include <limits>
 #include <string>
 
+#include "tangible/scene/coupling.h"
+#include "tangible/scene/joint_graph.h"
+#include "tangible/scene/validate.h"
 #include "tangible/verification/support/random_scene_maker.h"
 
 namespace tangible::internal {
@@ -246,6 +249,50 @@ void SceneMaker::Servos() {
       force.torque = 0.0;
       force.torque_servo = Servo(body.angle, &random);
     }
+  }
+}
+
+void SceneMaker::Couplings() {
+  if (seed_ % 4 != 1) {
+    return;
+  }
+  RandomNumbers random(0x67656172ULL + 0x9e3779b97f4a7c15ULL * seed_);
+  const std::vector<JointPlace> places = ClassifyJoints(scene_);
+  const int count = static_cast<int>(scene_.joints.size());
+  // A joint is part of one coupling at most, and those in loops, whose coordinates depend on each
+  // other, of one with limits.
+  for (int first = 0; first + 1 < count; ++first) {
+    if (!random.Chance(0.5)) continue;
+    BasicJoint<double> coupling;
+    coupling.name = "gear" + std::to_string(first);
+    coupling.type = JointType::kCoupling;
+    coupling.coupled[0] = first;
+    coupling.coupled[1] = first + 1;
+    coupling.ratio = random.Uniform(0.3, 2.0) * (random.Chance(0.5) ? 1.0 : -1.0);
+    if (!EndsOf(scene_, coupling).fault.empty()) continue;
+    const auto in_tree = [&](int joint) { return places[joint] != JointPlace::kLoop; };
+    const BasicJoint<double>& a = scene_.joints[first];
+    const BasicJoint<double>& b = scene_.joints[first + 1];
+    if (a.rate != 0.0 && b.rate != 0.0) coupling.ratio = -a.rate / b.rate;
+    scene_.joints.push_back(coupling);
+    BasicJoint<double>& added = scene_.joints.back();
+    if (!in_tree(first) || !in_tree(first + 1) || random.Chance(0.4) ||
+        !CoupledRatesFault(scene_, "").empty()) {
+      added.limits = {random.Chance(0.2) ? 0.0 : -random.Uniform(0.001, 0.02),
+                      random.Chance(0.2) ? 0.0 : random.Uniform(0.001, 0.02)};
+      if (random.Chance(0.5)) added.limit_restitution = random.Uniform(0.0, 1.0);
+    }
+    ++first;
+  }
+}
+
+void SceneMaker::Ends() {
+  if (seed_ % 4 != 1) {
+    return;
+  }
+  RandomNumbers random(0x656e6473ULL + 0x9e3779b97f4a7c15ULL * seed_);
+  for (BasicJoint<double>& joint : scene_.joints) {
+    if (random.Chance(0.3)) joint.until = random.Uniform(0.05, 1.1) * scene_.simulation.duration;
   }
 }
 

@@ -80,6 +80,8 @@ Scene SceneMaker::Make() {
   Drives();
   Outlines();
   Servos();
+  Couplings();
+  Ends();
   return scene_;
 }
 

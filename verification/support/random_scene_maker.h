@@ -74,6 +74,9 @@ class SceneMaker {
   void Outlines();
   /// Servos of joints and forces in every fourth scene, likewise.
   void Servos();
+  /// Couplings of joints and joints that end, in every fourth scene, likewise.
+  void Couplings();
+  void Ends();
   /// A servo whose coordinate starts at `at`.
   BasicServo<double> Servo(double at, RandomNumbers* random);
 

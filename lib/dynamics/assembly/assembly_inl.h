@@ -136,6 +136,7 @@ class ProblemBuilder {
   ShapeView<T> ShapeOfB(const ActiveContact& contact) const {
     return tangible::ShapeOfB(model_, contact);
   }
+  bool IsReleased(int j) const { return tangible::IsReleased(state_, j); }
   JointRows<T>& RowsOf(int j) { return scratch_.joints[j]; }
   JointRates<T>& RatesOf(int j) { return scratch_.rates[kLevel == Level::kAcceleration ? j : 0]; }
   ContactRateScratch<T>* RateScratch() { return &scratch_.contact; }

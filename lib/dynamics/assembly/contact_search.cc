@@ -134,7 +134,7 @@ void ContactSearch::FindLimits(const Model<double>& model, const State<double>& 
                                std::vector<ActiveContact>* contacts) {
   const ModelStructure& structure = *model.structure;
   limits_.clear();
-  AppendLimits(model, &limits_);
+  AppendLimits(model, state, &limits_);
   for (ActiveContact limit : limits_) {
     const JointIndex& joint = structure.joints[limit.joint];
     ContactRows<double> rows;
@@ -277,7 +277,7 @@ void ContactSearch::Find(const Model<double>& model, const State<double>& state,
   for (size_t i = restitution->size(); i < contacts->size(); ++i) {
     restitution->push_back(RestitutionOf(model, (*contacts)[i]));
   }
-  AppendJointFriction(model, contacts);
+  AppendJointFriction(model, state, contacts);
   for (size_t i = friction->size(); i < contacts->size(); ++i) {
     friction->push_back(FrictionOf(model, (*contacts)[i]));
   }

@@ -14,6 +14,7 @@
 //   PoseOf, Angle, TwistOf, Moving (body)     where a body is, and how it moves
 //   ShapeOfA, ShapeOfB (contact)              its shapes
 //   RowsOf, RatesOf (joint), RateScratch      memory
+//   IsReleased(j)                             whether joint j has ended
 //   Restitution(i), Approach(contact, rows)   of contact i: e, and n·v before the step
 //   Time()                                    of accelerations
 //   ModeOf(servo, time)                       of a servo: servo.h
@@ -26,9 +27,13 @@
 //   Along(a, row_a, b, row_b, push, damping)  load += rowᵀ (push − damping · speed)
 //   Decay(a, row_a, b, row_b, numbers)        load += rowᵀ FrictionDecay(numbers, speed)
 //   Joint(j, rows, rhs)                       row · x = rhs − prescribed speed
+//   Share(j, k, rows, rhs)                    coordinate k's share of a coupling's row; builders
+//                                             that keep joints receive the whole row
+//   BeginShare(k)                             the contact that follows is one such share
 //   Contact(i, contact, rows, c_n, c_t)       n · x + c_n, t · x + c_t
 
 #include "tangible/dynamics/assembly/assembly.h"
+#include "tangible/dynamics/elements/joint_coupling_inl.h"
 
 namespace tangible::internal {
 
@@ -98,21 +103,29 @@ class Equations {
   }
 
   void Joint(int j) {
-    b_.Begin();
     const JointIndex& joint = s_.joints[j];
+    T rhs[3];
+    const bool released = b_.IsReleased(j);
+    if constexpr (!Builder::kKeepsJoints) {
+      if (released) return;
+      for (int k = 0; k < 2 && joint.IsCoupling(); ++k) {
+        b_.Begin();
+        JointRows<T> share;
+        JointRates<T> rates;
+        EvaluateShare(joint, k, &share, &rates);
+        RightHandSide(share, rates, rhs);
+        b_.Share(j, k, share, rhs);
+      }
+      if (joint.IsCoupling()) return;
+    }
+    b_.Begin();
     JointRows<T>& rows = b_.RowsOf(j);
     JointRates<T>& rates = b_.RatesOf(j);
     EvaluateRows(joint, &rows, &rates);
-    T rhs[3] = {T(0.0), T(0.0), T(0.0)};
-    const double share = DriftShare();
-    for (int k = 0; k < rows.rows; ++k) {
-      if constexpr (kLevel == Level::kAcceleration) {
-        rhs[k] = -rates.row[k];
-      } else if (share != 0.0) {
-        rhs[k] = -share * rows.error[k];
-      }
-    }
+    if (released) rows.rows = 0;
+    RightHandSide(rows, rates, rhs);
     b_.Joint(j, rows, rhs);
+    if (released) return;
     Drive(joint, rows.coordinate_a, rows.coordinate_b);
   }
 
@@ -120,7 +133,7 @@ class Equations {
   /// joint it would read more variables than a local Jet has.
   void JointSpring(int j) {
     const JointIndex& joint = s_.joints[j];
-    if (joint.stiffness < 0 || Weight() == 0.0) {
+    if (joint.stiffness < 0 || Weight() == 0.0 || b_.IsReleased(j)) {
       return;
     }
     b_.Begin();
@@ -138,6 +151,7 @@ class Equations {
     if constexpr (kLevel != Level::kCorrection) {
       if (Weight() == 0.0) return;
       const ServoIndex& servo = s_.servos[k];
+      if (servo.joint >= 0 && b_.IsReleased(servo.joint)) return;
       ServoTime<T> time;
       time.h = kLevel == Level::kVelocity ? at_.h : 0.0;
       time.time = kLevel == Level::kVelocity ? T(at_.t) : T(ValueOf(at_.time));
@@ -170,7 +184,7 @@ class Equations {
   void JointFrictionDecay(int j) {
     if constexpr (kLevel == Level::kAcceleration) {
       const JointIndex& joint = s_.joints[j];
-      if (!joint.has_decay) {
+      if (!joint.has_decay || b_.IsReleased(j)) {
         return;
       }
       b_.Begin();
@@ -204,6 +218,12 @@ class Equations {
   }
 
   void Contact(int i, const ActiveContact& contact) {
+    if constexpr (!Builder::kKeepsJoints) {
+      if (contact.joint >= 0 && s_.joints[contact.joint].IsCoupling()) {
+        for (int k = 0; k < 2; ++k) CoupledLimit(i, contact, k);
+        return;
+      }
+    }
     b_.Begin();
     ContactRows<T> rows;
     ContactRates<T> rates;
@@ -224,14 +244,7 @@ class Equations {
       rows.geometry = EvaluateContact(contact.feature, shape_a, pose_a, shape_b, pose_b);
       RowsFromGeometry(shape_a.type, pose_a.position, shape_b.type, pose_b.position, &rows);
     }
-    if constexpr (kLevel == Level::kVelocity) {
-      rates.normal = LawConstant(contact.law, rows.geometry.gap, at_.h, b_.Restitution(i),
-                                 b_.Approach(contact, rows), s_.settings);
-      if (contact.is_motor) rates.tangent = rows.slide;
-    } else if constexpr (kLevel == Level::kCorrection) {
-      rates.normal = contact.law == ContactLaw::kRecovery ? T(-at_.recovery) : rows.geometry.gap;
-    }
-    b_.Contact(i, contact, rows, rates.normal, rates.tangent);
+    FinishContact(i, contact, &rows, &rates);
   }
 
   /// The factor of forces: the length of the step, or 1; corrections have no forces.
@@ -247,6 +260,63 @@ class Equations {
   }
 
  private:
+  void FinishContact(int i, const ActiveContact& contact, ContactRows<T>* at,
+                     ContactRates<T>* of_rows) {
+    ContactRows<T>& rows = *at;
+    ContactRates<T>& rates = *of_rows;
+    if constexpr (kLevel == Level::kVelocity) {
+      rates.normal = LawConstant(contact.law, rows.geometry.gap, at_.h, b_.Restitution(i),
+                                 b_.Approach(contact, rows), s_.settings);
+      if (contact.is_motor) rates.tangent = rows.slide;
+    } else if constexpr (kLevel == Level::kCorrection) {
+      rates.normal = contact.law == ContactLaw::kRecovery ? T(-at_.recovery) : rows.geometry.gap;
+    }
+    b_.Contact(i, contact, rows, rates.normal, rates.tangent);
+  }
+
+  /// The share that coordinate k has in a limit of a coupling, as a limit of the coupled joint.
+  void CoupledLimit(int i, const ActiveContact& contact, int k) {
+    b_.Begin();
+    const JointIndex& joint = s_.joints[contact.joint];
+    JointRows<T> share;
+    JointRates<T> share_rates;
+    EvaluateShare(joint, k, &share, &share_rates);
+    const T number = k == 0 ? b_.Number(LimitNumber(joint, contact)) : T(0.0);
+    ActiveContact of_share = contact;
+    of_share.a = s_.joints[joint.coupled[k]].a;
+    of_share.b = s_.joints[joint.coupled[k]].b;
+    ContactRows<T> rows;
+    ContactRates<T> rates;
+    EvaluateLimitRows(number, share, contact, &rows);
+    if constexpr (kLevel == Level::kAcceleration) SetLimitRates(contact, share_rates, &rates);
+    b_.BeginShare(k);
+    FinishContact(i, of_share, &rows, &rates);
+  }
+
+  void RightHandSide(const JointRows<T>& rows, const JointRates<T>& rates, T rhs[3]) const {
+    const double share = DriftShare();
+    for (int k = 0; k < 3; ++k) {
+      rhs[k] = T(0.0);
+      if (k >= rows.rows) continue;
+      if constexpr (kLevel == Level::kAcceleration) {
+        rhs[k] = -rates.row[k];
+      } else if (share != 0.0) {
+        rhs[k] = -share * rows.error[k];
+      }
+    }
+  }
+
+  /// Coordinate k of a coupling: its share of the rows, and of the rates.
+  void EvaluateShare(const JointIndex& coupling, int k, JointRows<T>* share, JointRates<T>* rates) {
+    EvaluateRows(s_.joints[coupling.coupled[k]], share, rates);
+    // The first share reads the value at time 0, the other one the ratio.
+    const T number = b_.Number(coupling.geometry + (k == 0 ? 1 : 0));
+    const T numbers[2] = {number, number};
+    ScaleToShare(coupling.type, k, numbers, share);
+    if (k == 1) rates->coordinate = number * rates->coordinate;
+    rates->row[0] = rates->coordinate;
+  }
+
   void ServoDamper(const ServoIndex& servo, double target_rate) {
     b_.Begin();
     ServoRows<T> rows;
@@ -297,6 +367,18 @@ class Equations {
   }
 
   void EvaluateRows(const JointIndex& joint, JointRows<T>* rows, JointRates<T>* rates) {
+    if (joint.IsCoupling()) {
+      T rate(0.0);
+      for (int k = 0; k < 2; ++k) {
+        JointRows<T> share;
+        JointRates<T> of_share;
+        EvaluateShare(joint, k, &share, &of_share);
+        AddShare(joint, s_.joints[joint.coupled[k]], k, share, rows);
+        rate += of_share.coordinate;
+      }
+      rates->coordinate = rates->row[0] = rate;
+      return;
+    }
     if constexpr (kLevel == Level::kAcceleration) {
       T buffer[7];
       const MovingPose<T> a = b_.Moving(joint.a);

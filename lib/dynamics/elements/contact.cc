@@ -48,11 +48,12 @@ CoefficientSource FrictionOf(const Model<double>& model, const ActiveContact& co
   return contact.IsJointFriction() ? OwnCoefficient(model, joint.friction) : CoefficientSource();
 }
 
-void AppendLimits(const Model<double>& model, std::vector<ActiveContact>* contacts) {
+void AppendLimits(const Model<double>& model, const State<double>& state,
+                  std::vector<ActiveContact>* contacts) {
   const std::vector<JointIndex>& joints = model.structure->joints;
   for (size_t j = 0; j < joints.size(); ++j) {
     for (const double side : {1.0, -1.0}) {
-      if (!HasLimit(model, joints[j], side)) continue;
+      if (!HasLimit(model, state, joints[j], side)) continue;
       ActiveContact& limit = contacts->emplace_back();
       limit.a = joints[j].a;
       limit.b = joints[j].b;
@@ -63,9 +64,11 @@ void AppendLimits(const Model<double>& model, std::vector<ActiveContact>* contac
   }
 }
 
-void AppendJointFriction(const Model<double>& model, std::vector<ActiveContact>* contacts) {
+void AppendJointFriction(const Model<double>& model, const State<double>& state,
+                         std::vector<ActiveContact>* contacts) {
   const std::vector<JointIndex>& joints = model.structure->joints;
   for (size_t j = 0; j < joints.size(); ++j) {
+    if (IsReleased(state, static_cast<int>(j))) continue;
     for (const bool is_motor : {false, true}) {
       if ((is_motor ? joints[j].motor : joints[j].friction) < 0) continue;
       ActiveContact& contact = contacts->emplace_back();

@@ -183,19 +183,22 @@ CoefficientSource RestitutionOf(const Model<double>& model, const ActiveContact&
 /// limit has none.
 CoefficientSource FrictionOf(const Model<double>& model, const ActiveContact& contact);
 
-/// Whether a joint has a limit on a side (+1 low, −1 high) that it can reach: the distance of a
-/// rope's ends is never below 0, and at 0 it has no direction.
-inline bool HasLimit(const Model<double>& model, const JointIndex& joint, double side) {
+/// Whether a joint that has not been released has a limit on a side (+1 low, −1 high) that it can
+/// reach: the distance of a rope's ends is never below 0, and at 0 it has no direction.
+inline bool HasLimit(const Model<double>& model, const State<double>& state,
+                     const JointIndex& joint, double side) {
   const int limit = side > 0.0 ? joint.low : joint.high;
-  return limit >= 0 &&
+  return limit >= 0 && !IsReleased(*model.structure, state, joint) &&
          (joint.type != JointType::kRope || side < 0.0 || model.parameters[limit] > 0.0);
 }
 
 /// The limits of all joints (HasLimit), of a joint the low one first; gaps are not set.
-void AppendLimits(const Model<double>& model, std::vector<ActiveContact>* contacts);
+void AppendLimits(const Model<double>& model, const State<double>& state,
+                  std::vector<ActiveContact>* contacts);
 
-/// The friction and motor of each joint that has them, which are active at all times.
-void AppendJointFriction(const Model<double>& model, std::vector<ActiveContact>* contacts);
+/// The friction and motor of each joint that has them, which are active until it is released.
+void AppendJointFriction(const Model<double>& model, const State<double>& state,
+                         std::vector<ActiveContact>* contacts);
 
 /// The coefficient as a T, by the chain rule.
 template <typename T>
@@ -333,8 +336,7 @@ void EvaluateActiveRows(const Model<T>& model, const State<T>& state, const Acti
   }
   const JointIndex& joint = model.structure->joints[contact.joint];
   JointRows<T> joint_rows;
-  EvaluateJoint(joint.type, state.PoseOf(joint.a), state.PoseOf(joint.b),
-                &model.parameters[joint.geometry], &joint_rows);
+  EvaluateJoint(model, state, joint, &joint_rows);
   EvaluateLimitRows(model.parameters[LimitNumber(joint, contact)], joint_rows, contact, rows);
 }
 

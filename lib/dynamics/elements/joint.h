@@ -9,15 +9,16 @@
 //   kDistance    C = |p_a − p_b| − L                            (1 row)
 //   kFixedAngle  C = θ_a − θ_b − θ0                             (1 row)
 //
-//   kCoupling    C = g_a·q_a + g_b·q_b − c                      (1 row)
+//   kCoupling    C = x_1 + r x_2 − c, of two joints' coordinates  (1 row)
 //
 //   kRope, kLimitedCoupling  none                               (0 rows)
 //
-// p: the anchors of each body. The coordinate of a revolute joint is θ_a − θ_b − θ0, of a prismatic
-// one u·(p_a − p_b), of a rope |p_a − p_b|, of a coupling with limits C; efforts, damping,
-// friction, motors and limits act along its row. One file a type: joint_*_inl.h.
+// p: the anchors of each body; x_1 and x_2 are coordinates. The coordinate of a revolute joint is
+// θ_a − θ_b − θ0, of a prismatic one u·(p_a − p_b), of a rope |p_a − p_b|, of a coupling with
+// limits C; efforts, damping, friction, motors and limits act along its row. One file a type:
+// joint_*_inl.h.
 
-#include "tangible/dynamics/model/model.h"
+#include "tangible/dynamics/model/model_releases.h"
 #include "tangible/lcp/system/contact_problem.h"
 
 namespace tangible {
@@ -43,10 +44,21 @@ inline bool HasAnchors(JointType type) {
          type != JointType::kLimitedCoupling;
 }
 
-/// Evaluates a joint at two poses; `numbers` as JointIndex describes its geometry. A distance joint
-/// whose anchors coincide has the row (1, 0), its derivative 0.
+/// Evaluates a joint other than a coupling at two poses; `numbers` as JointIndex describes its
+/// geometry. A distance joint whose anchors coincide has the row (1, 0), its derivative 0.
 template <typename T>
 void EvaluateJoint(JointType type, const Pose<T>& pose_a, const Pose<T>& pose_b, const T* numbers,
+                   JointRows<T>* out);
+
+/// Evaluates any joint of a model at a state; one that has been released has no rows.
+template <typename T>
+void EvaluateJoint(const Model<T>& model, const State<T>& state, const JointIndex& joint,
+                   JointRows<T>* out);
+
+/// The share that coordinate k of a coupling has in its rows: an element of its own, on the bodies
+/// of the coupled joint.
+template <typename T>
+void EvaluateShare(const Model<T>& model, const State<T>& state, const JointIndex& coupling, int k,
                    JointRows<T>* out);
 
 /// The row that maps the twist of a body to the velocity along `direction` of the point at `arm`

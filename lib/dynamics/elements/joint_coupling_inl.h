@@ -1,32 +1,56 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Coupling of two joints' coordinates: g_a·q_a + g_b·q_b, q = (x, y, θ), stays as it is at time 0,
-// or is the coordinate that limits bound. scene/coupling.h tells why it is linear in the poses, so
-// that its rows are constant. Included by joint.cc alone.
+// Coupling of two joints' coordinates: x_1 + ratio x_2 stays as it is at time 0, or is the
+// coordinate that limits bound. Each coordinate is that of its own joint, which is evaluated apart:
+// derivatives take the shares one by one, because together they would read more variables than a
+// local Jet has. Numbers: the ratio, and the value at time 0.
 
 #include "tangible/dynamics/elements/joint.h"
 
 namespace tangible {
 
+/// Turns the rows of the coupled joint k, whose coordinate has been evaluated, into its share of
+/// the coupling's rows: a row, or a coordinate, on the bodies of that joint.
 template <typename T>
-void EvaluateCoupling(JointType type, const Pose<T>& pose_a, const Pose<T>& pose_b,
-                      const T* numbers, JointRows<T>* out) {
-  const RowPart<T> row_a = {numbers[0], numbers[1], numbers[2]};
-  const RowPart<T> row_b = {numbers[3], numbers[4], numbers[5]};
-  const auto along = [](const RowPart<T>& row, const Pose<T>& pose) {
-    return T(row[0] * pose.position.x() + row[1] * pose.position.y() + row[2] * pose.angle);
-  };
-  const T value = along(row_a, pose_a) + along(row_b, pose_b) - numbers[6];
+void ScaleToShare(JointType type, int k, const T numbers[2], JointRows<T>* share) {
+  const T factor = k == 0 ? T(1.0) : numbers[0];
+  for (int i = 0; i < 3; ++i) {
+    share->coordinate_a[i] = factor * share->coordinate_a[i];
+    share->coordinate_b[i] = factor * share->coordinate_b[i];
+  }
+  share->coordinate = factor * share->coordinate;
+  if (k == 0) share->coordinate -= numbers[1];
+  share->rows = 0;
   if (type == JointType::kCoupling) {
-    out->rows = 1;
-    out->row_a[0] = row_a;
-    out->row_b[0] = row_b;
-    out->error[0] = value;
-  } else {
-    out->rows = 0;
-    out->coordinate_a = row_a;
-    out->coordinate_b = row_b;
-    out->coordinate = value;
+    share->rows = 1;
+    share->row_a[0] = share->coordinate_a;
+    share->row_b[0] = share->coordinate_b;
+    share->error[0] = share->coordinate;
+  }
+}
+
+/// Adds a share to the rows of the coupling, on its own bodies; `of` is the coupled joint. What it
+/// has on static bodies has no effect.
+template <typename T>
+void AddShare(const JointIndex& coupling, const JointIndex& of, int k, const JointRows<T>& share,
+              JointRows<T>* out) {
+  if (k == 0) {
+    out->coordinate_a = out->coordinate_b = {T(0.0), T(0.0), T(0.0)};
+    out->coordinate = T(0.0);
+  }
+  const auto add = [&](int body, const RowPart<T>& part) {
+    if (body != coupling.a && body != coupling.b) return;
+    RowPart<T>& row = body == coupling.a ? out->coordinate_a : out->coordinate_b;
+    for (int i = 0; i < 3; ++i) row[i] += part[i];
+  };
+  add(of.a, share.coordinate_a);
+  add(of.b, share.coordinate_b);
+  out->coordinate += share.coordinate;
+  out->rows = share.rows;
+  if (share.rows > 0) {
+    out->row_a[0] = out->coordinate_a;
+    out->row_b[0] = out->coordinate_b;
+    out->error[0] = out->coordinate;
   }
 }
 

@@ -46,15 +46,98 @@ void AddDistance(const Vector2<T>& arm_a, const Vector2<T>& arm_b, const Vector2
   out->bb[kAngle] += multiplier * Dot(normal, arm_b);
 }
 
+// Of w·(p_a − p_b) with a direction w fixed in b; `reach` is p_a − x_b.
+template <typename T>
+void AddAlong(const Vector2<T>& w, const Vector2<T>& arm_a, const Vector2<T>& reach, const T& mu,
+              JointCurvature<T>* out) {
+  const Vector2<T> turned = Perp(w);
+  out->aa[kAngle] = -mu * Dot(w, arm_a);
+  out->bb[kAngle] = -mu * Dot(w, reach);
+  for (int i = 0; i < 2; ++i) {
+    out->ab[3 * i + 2] = mu * turned[i];
+    out->bb[3 * i + 2] = out->bb[6 + i] = -mu * turned[i];
+  }
+  out->ab[kAngle] = mu * Dot(w, arm_a);
+}
+
+template <typename T>
+void SetZero(JointCurvature<T>* out) {
+  std::fill_n(out->aa, 9, T(0.0));
+  std::fill_n(out->ab, 9, T(0.0));
+  std::fill_n(out->bb, 9, T(0.0));
+}
+
+// The curvature of the coordinate of a slider or rope, times a multiplier; that of a hinge is 0.
+template <typename T>
+void EvaluateCoordinateCurvature(JointType type, const Pose<T>& pose_a, const Pose<T>& pose_b,
+                                 const T* numbers, const T& multiplier, JointCurvature<T>* out) {
+  SetZero(out);
+  const Vector2<T> arm_a = pose_a.rotation * Vector2<T>(numbers[0], numbers[1]);
+  if (type == JointType::kPrismatic) {
+    const Vector2<T> axis = pose_b.rotation * Vector2<T>(numbers[4], numbers[5]);
+    AddAlong(axis, arm_a, Vector2<T>(pose_a.position + arm_a - pose_b.position), multiplier, out);
+  } else if (type == JointType::kRope) {
+    const Vector2<T> arm_b = pose_b.rotation * Vector2<T>(numbers[2], numbers[3]);
+    const Vector2<T> offset = pose_a.position + arm_a - pose_b.position - arm_b;
+    AddDistance(arm_a, arm_b, offset, multiplier, out);
+  }
+}
+
+// Adds the curvature of a coordinate, on its own bodies, to that of the coupling.
+template <typename T>
+void AddCurvature(const JointIndex& coupling, const JointIndex& of, const JointCurvature<T>& share,
+                  JointCurvature<T>* out) {
+  const auto diagonal = [&](int body, const T* block) {
+    T* const to = body == coupling.a ? out->aa : body == coupling.b ? out->bb : nullptr;
+    for (int i = 0; i < 9 && to != nullptr; ++i) to[i] += block[i];
+  };
+  diagonal(of.a, share.aa);
+  diagonal(of.b, share.bb);
+  for (int i = 0; i < 9; ++i) {
+    if (of.a == coupling.a && of.b == coupling.b) out->ab[i] += share.ab[i];
+    if (of.a == coupling.b && of.b == coupling.a) out->ab[i] += share.ab[3 * (i % 3) + i / 3];
+  }
+}
+
 }  // namespace
+
+bool CouplesBodies(const ModelStructure& structure, const JointIndex& joint) {
+  if (structure.bodies[joint.a].block < 0 || structure.bodies[joint.b].block < 0) return false;
+  if (joint.type != JointType::kCoupling) {
+    return joint.type == JointType::kPrismatic || joint.type == JointType::kDistance;
+  }
+  return std::any_of(joint.coupled, joint.coupled + 2, [&](int coupled) {
+    const JointIndex& of = structure.joints[coupled];
+    return of.type != JointType::kRevolute && structure.bodies[of.a].block >= 0 &&
+           structure.bodies[of.b].block >= 0;
+  });
+}
+
+template <typename T>
+void EvaluateJointCurvature(const Model<T>& model, const State<T>& state, const JointIndex& joint,
+                            const T* multipliers, JointCurvature<T>* out) {
+  if (joint.type != JointType::kCoupling) {
+    EvaluateJointCurvature(joint.type, state.PoseOf(joint.a), state.PoseOf(joint.b),
+                           &model.parameters[joint.geometry], multipliers, out);
+    return;
+  }
+  SetZero(out);
+  for (int k = 0; k < 2; ++k) {
+    const JointIndex& of = model.structure->joints[joint.coupled[k]];
+    const T multiplier =
+        k == 0 ? multipliers[0] : model.parameters[joint.geometry] * multipliers[0];
+    JointCurvature<T> share;
+    EvaluateCoordinateCurvature(of.type, state.PoseOf(of.a), state.PoseOf(of.b),
+                                &model.parameters[of.geometry], multiplier, &share);
+    AddCurvature(joint, of, share, out);
+  }
+}
 
 template <typename T>
 void EvaluateJointCurvature(JointType type, const Pose<T>& pose_a, const Pose<T>& pose_b,
                             const T* numbers, const T* multipliers, JointCurvature<T>* out) {
-  std::fill_n(out->aa, 9, T(0.0));
-  std::fill_n(out->ab, 9, T(0.0));
-  std::fill_n(out->bb, 9, T(0.0));
-  if (type == JointType::kFixedAngle || type == JointType::kCoupling) {
+  SetZero(out);
+  if (type == JointType::kFixedAngle) {
     return;
   }
   const Vector2<T> arm_a = pose_a.rotation * Vector2<T>(numbers[0], numbers[1]);
@@ -75,16 +158,8 @@ void EvaluateJointCurvature(JointType type, const Pose<T>& pose_a, const Pose<T>
     case JointType::kPrismatic: {
       const Vector2<T> across =
           Perp(Vector2<T>(pose_b.rotation * Vector2<T>(numbers[4], numbers[5])));
-      const Vector2<T> turned = Perp(across);
-      const Vector2<T> reach = pose_a.position + arm_a - pose_b.position;
-      const T& mu = multipliers[0];
-      out->aa[kAngle] = -mu * Dot(across, arm_a);
-      out->bb[kAngle] = -mu * Dot(across, reach);
-      for (int i = 0; i < 2; ++i) {
-        out->ab[3 * i + 2] = mu * turned[i];
-        out->bb[3 * i + 2] = out->bb[6 + i] = -mu * turned[i];
-      }
-      out->ab[kAngle] = mu * Dot(across, arm_a);
+      AddAlong(across, arm_a, Vector2<T>(pose_a.position + arm_a - pose_b.position), multipliers[0],
+               out);
       break;
     }
     case JointType::kFixedAngle:
@@ -96,6 +171,8 @@ void EvaluateJointCurvature(JointType type, const Pose<T>& pose_a, const Pose<T>
 }
 
 #define TANGIBLE_INSTANTIATE(T)                                                                \
+  template void EvaluateJointCurvature<T>(const Model<T>&, const State<T>&, const JointIndex&, \
+                                          const T*, JointCurvature<T>*);                       \
   template void EvaluateJointCurvature<T>(JointType, const Pose<T>&, const Pose<T>&, const T*, \
                                           const T*, JointCurvature<T>*);
 #define TANGIBLE_INSTANTIATE_JET(N) TANGIBLE_INSTANTIATE(Jet<N>)

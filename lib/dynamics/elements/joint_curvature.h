@@ -12,6 +12,8 @@
 //                    θaθa: −μ n·r_a          θbθb: μ n·r_b
 //   prismatic        θaθa: −μ w·r_a          θbθb: −μ w·(p_a − x_b)   w = u⊥, fixed in b
 //                    xaθb: μ w⊥              xbθb: −μ w⊥              θaθb: μ w·r_a
+//   coupling         of its coordinates: of a slider as above with w = u, of a rope as of a
+//                    distance
 //
 // These are the exact second derivatives; the projection onto the joints needs them, because the
 // direction of its constraint forces turns with the bodies.
@@ -26,13 +28,16 @@ struct JointCurvature {
   T aa[9], ab[9], bb[9];
 };
 
-/// Whether `ab` may differ from 0.
-inline bool CouplesBodies(JointType type) {
-  return type == JointType::kPrismatic || type == JointType::kDistance;
-}
+/// Whether both bodies move and `ab` may differ from 0.
+bool CouplesBodies(const ModelStructure& structure, const JointIndex& joint);
 
-/// `multipliers`: one for each row of the joint. For a distance joint whose anchors coincide the
-/// term with t is 0.
+/// Of any joint of a model, at a state.
+template <typename T>
+void EvaluateJointCurvature(const Model<T>& model, const State<T>& state, const JointIndex& joint,
+                            const T* multipliers, JointCurvature<T>* out);
+
+/// The same of a joint other than a coupling. `multipliers`: one for each row of the joint. For a
+/// distance joint whose anchors coincide the term with t is 0.
 template <typename T>
 void EvaluateJointCurvature(JointType type, const Pose<T>& pose_a, const Pose<T>& pose_b,
                             const T* numbers, const T* multipliers, JointCurvature<T>* out);

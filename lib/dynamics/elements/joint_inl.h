@@ -35,13 +35,36 @@ void EvaluateJoint(JointType type, const Pose<T>& pose_a, const Pose<T>& pose_b,
       break;
     case JointType::kCoupling:
     case JointType::kLimitedCoupling:
-      EvaluateCoupling(type, pose_a, pose_b, numbers, out);
-      break;
+      break;  // its shares are evaluated apart
     case JointType::kFixedAngle:
       EvaluateAngleRow(pose_a, pose_b, numbers[0], 0, out);
       out->rows = 1;
       break;
   }
+}
+
+template <typename T>
+void EvaluateShare(const Model<T>& model, const State<T>& state, const JointIndex& coupling, int k,
+                   JointRows<T>* out) {
+  const JointIndex& of = model.structure->joints[coupling.coupled[k]];
+  EvaluateJoint(of.type, state.PoseOf(of.a), state.PoseOf(of.b), &model.parameters[of.geometry],
+                out);
+  ScaleToShare(coupling.type, k, &model.parameters[coupling.geometry], out);
+}
+
+template <typename T>
+void EvaluateJoint(const Model<T>& model, const State<T>& state, const JointIndex& joint,
+                   JointRows<T>* out) {
+  if (!joint.IsCoupling()) {
+    EvaluateJoint(joint.type, state.PoseOf(joint.a), state.PoseOf(joint.b),
+                  &model.parameters[joint.geometry], out);
+  }
+  for (int k = 0; k < 2 && joint.IsCoupling(); ++k) {
+    JointRows<T> share;
+    EvaluateShare(model, state, joint, k, &share);
+    AddShare(joint, model.structure->joints[joint.coupled[k]], k, share, out);
+  }
+  if (IsReleased(*model.structure, state, joint)) out->rows = 0;
 }
 
 }  // namespace tangible

@@ -13,15 +13,15 @@ class GradientVisitor : private internal::LocalEntries<EntryListSink> {
   using LocalEntries::LocalEntries;
 
   void Gap(const ActiveContact& contact) {
-    Locals locals;
     if (contact.joint >= 0) {
       const JointIndex& joint = s_.joints[contact.joint];
-      JointRows<LocalJet> rows;
-      LocalJointRows(joint, &locals, &rows);
-      Emit(locals, 0, contact.side * rows.coordinate);
+      ForEachShare(joint, [&](const JointIndex&, const Locals& of_share, const auto& rows) {
+        Emit(of_share, 0, contact.side * rows.coordinate);
+      });
       sink_(0, s_.ParameterVariable(contact.side > 0.0 ? joint.low : joint.high), -contact.side);
       return;
     }
+    Locals locals;
     ContactRows<LocalJet> rows;
     LocalContactRows(contact, &locals, &rows);
     Emit(locals, 0, rows.geometry.gap);
@@ -32,7 +32,7 @@ class GradientVisitor : private internal::LocalEntries<EntryListSink> {
     if (contact.joint >= 0) {
       JointRows<LocalJet> rows;
       LocalJointRows(s_.joints[contact.joint], &locals, &rows);
-      Speed(contact, locals, rows.coordinate_a, rows.coordinate_b);
+      Speed(contact.a, contact.b, locals, rows.coordinate_a, rows.coordinate_b);
       if (contact.is_motor) {
         sink_(0, s_.ParameterVariable(s_.joints[contact.joint].motor), -1.0);
       }
@@ -40,25 +40,26 @@ class GradientVisitor : private internal::LocalEntries<EntryListSink> {
     }
     ContactRows<LocalJet> rows;
     LocalContactRows(contact, &locals, &rows);
-    Speed(contact, locals, rows.tangent_a, rows.tangent_b);
+    Speed(contact.a, contact.b, locals, rows.tangent_a, rows.tangent_b);
   }
 
   void Approach(const ActiveContact& contact) {
-    Locals locals;
     if (contact.joint >= 0) {
-      JointRows<LocalJet> rows;
-      LocalJointRows(s_.joints[contact.joint], &locals, &rows);
-      RowPart<LocalJet> opens_a, opens_b;
-      for (int i = 0; i < 3; ++i) {
-        opens_a[i] = contact.side * rows.coordinate_a[i];
-        opens_b[i] = contact.side * rows.coordinate_b[i];
-      }
-      Speed(contact, locals, opens_a, opens_b);
+      const auto add = [&](const JointIndex& of, const Locals& of_share, const auto& rows) {
+        RowPart<LocalJet> opens_a, opens_b;
+        for (int i = 0; i < 3; ++i) {
+          opens_a[i] = contact.side * rows.coordinate_a[i];
+          opens_b[i] = contact.side * rows.coordinate_b[i];
+        }
+        Speed(of.a, of.b, of_share, opens_a, opens_b);
+      };
+      ForEachShare(s_.joints[contact.joint], add);
       return;
     }
+    Locals locals;
     ContactRows<LocalJet> rows;
     LocalContactRows(contact, &locals, &rows);
-    Speed(contact, locals, rows.normal_a, rows.normal_b);
+    Speed(contact.a, contact.b, locals, rows.normal_a, rows.normal_b);
   }
 
   void Servo(int k, double sign, double time, double middle) {
@@ -102,17 +103,16 @@ class GradientVisitor : private internal::LocalEntries<EntryListSink> {
     *out = {joint.a, joint.b, rows.coordinate_a, rows.coordinate_b, rows.coordinate};
   }
 
-  void Speed(const ActiveContact& contact, const Locals& locals, const RowPart<LocalJet>& row_a,
+  void Speed(int a, int b, const Locals& locals, const RowPart<LocalJet>& row_a,
              const RowPart<LocalJet>& row_b) {
     LocalJet speed(0.0);
     for (int i = 0; i < 3; ++i) {
-      speed +=
-          row_a[i] * state_.twist[3 * contact.a + i] + row_b[i] * state_.twist[3 * contact.b + i];
+      speed += row_a[i] * state_.twist[3 * a + i] + row_b[i] * state_.twist[3 * b + i];
     }
     Emit(locals, 0, speed);
     for (int i = 0; i < 3; ++i) {
-      EmitTwist(contact.a, i, row_a[i].a);
-      EmitTwist(contact.b, i, row_b[i].a);
+      EmitTwist(a, i, row_a[i].a);
+      EmitTwist(b, i, row_b[i].a);
     }
   }
 

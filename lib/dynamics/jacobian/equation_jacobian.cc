@@ -53,6 +53,7 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
       }
     }
     for (int j = 0; j < static_cast<int>(s_.joints.size()); ++j) {
+      if (IsReleased(j)) continue;
       const JointType type = s_.joints[j].type;
       const bool by_hand =
           by_hand_ && !this->FollowsPath(s_.joints[j].a) && !this->FollowsPath(s_.joints[j].b);
@@ -109,6 +110,7 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
   ShapeView<LocalJet> ShapeOfB(const ActiveContact& contact) {
     return LocalShapeOfB(contact, &locals_);
   }
+  bool IsReleased(int j) const { return tangible::IsReleased(state_, j); }
   JointRows<LocalJet>& RowsOf(int) { return joint_rows_; }
   JointRates<LocalJet>& RatesOf(int) { return joint_rates_; }
   ContactRateScratch<LocalJet>* RateScratch() { return &scratch_.rates; }
@@ -157,14 +159,7 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
 
   void Joint(int j, const JointRows<LocalJet>& rows, const LocalJet rhs[3]) {
     const JointIndex& joint = s_.joints[j];
-    const double* y = &solved_.solution->joint_impulse[3 * static_cast<size_t>(j)];
-    for (int k = 0; k < rows.rows; ++k) {
-      const int row = JointRow(j) + k;
-      Emit(locals_, row,
-           RowTimes(unknown_, joint.a, rows.row_a[k], joint.b, rows.row_b[k]) - rhs[k]);
-      EmitMomentum(locals_, joint.a, rows.row_a[k], joint.b, rows.row_b[k], -y[k]);
-      EmitPrescribed(joint.a, rows.row_a[k], joint.b, rows.row_b[k], row);
-    }
+    RowsOn(joint.a, joint.b, j, rows, rhs);
     if constexpr (kLevel == Level::kAcceleration) {
       internal::Locals twists;
       JointRates<LocalJet> rates;
@@ -174,6 +169,20 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
       }
     }
   }
+
+  void Share(int j, int k, const JointRows<LocalJet>& rows, const LocalJet rhs[3]) {
+    const JointIndex& of = s_.joints[s_.joints[j].coupled[k]];
+    RowsOn(of.a, of.b, j, rows, rhs);
+    if constexpr (kLevel == Level::kAcceleration) {
+      if (rows.rows == 0) return;
+      internal::Locals twists;
+      JointRates<LocalJet> rates;
+      this->ShareRatesByTwist(s_.joints[j], k, &twists, &rates);
+      Emit(twists, JointRow(j), rates.coordinate);
+    }
+  }
+
+  void BeginShare(int k) { share_ = k; }
 
   void Contact(int i, const ActiveContact& contact, const ContactRows<LocalJet>& rows,
                const LocalJet& c_n, const LocalJet& c_t) {
@@ -194,7 +203,7 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
     if constexpr (kLevel == Level::kAcceleration) {
       internal::Locals twists;
       ContactRates<LocalJet> rates;
-      RatesByTwist(contact, &twists, &rates);
+      RatesByTwist(contact, share_, &twists, &rates);
       Emit(twists, row, rates.normal);
       if (sticks) {
         Emit(twists, row + 1, rates.tangent);
@@ -216,6 +225,7 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
   using Base::LocalShapeOfA;
   using Base::LocalShapeOfB;
   using Base::model_;
+  using Base::RatesByTwist;
   using Base::s_;
   using Base::scratch_;
   using Base::sink_;
@@ -230,6 +240,17 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
       sum += row_a[i] * x[3 * a + i] + row_b[i] * x[3 * b + i];
     }
     return sum;
+  }
+
+  // The rows of joint j, or a share of them, on two bodies.
+  void RowsOn(int a, int b, int j, const JointRows<LocalJet>& rows, const LocalJet rhs[3]) {
+    const double* y = &solved_.solution->joint_impulse[3 * static_cast<size_t>(j)];
+    for (int k = 0; k < rows.rows; ++k) {
+      const int row = JointRow(j) + k;
+      Emit(locals_, row, RowTimes(unknown_, a, rows.row_a[k], b, rows.row_b[k]) - rhs[k]);
+      EmitMomentum(locals_, a, rows.row_a[k], b, rows.row_b[k], -y[k]);
+      EmitPrescribed(a, rows.row_a[k], b, rows.row_b[k], row);
+    }
   }
 
   // Whether the speeds that dampers act against are variables. In a step these are the new speeds,
@@ -636,7 +657,8 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
     const int row = 3 * (*solved_.contact_block)[i];
     if constexpr (kLevel == Level::kVelocity) {
       if (IsDriven(i)) {
-        // λn − e λ¹n, at a fixed impulse λ¹n of the compression.
+        // λn − e λ¹n, at a fixed impulse λ¹n of the compression; of a coupling once.
+        if (contact.joint >= 0 && s_.joints[contact.joint].IsCoupling() && share_ > 0) return;
         EmitCoefficient((*solved_.restitution)[i], row,
                         -solved_.problem->contacts[i].offset / (*solved_.restitution)[i].value);
       } else {
@@ -707,58 +729,6 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
     return SlipSign(state_, contact, rows);
   }
 
-  // A pose in double, with its twist as variables.
-  MovingPose<LocalJet> ByTwist(int body, internal::Locals* twists) {
-    internal::Locals constants;
-    MovingPose<LocalJet> moving{LocalPose(body, &constants), {}};
-    moving.pose.rotation.cosine.v.setZero();
-    moving.pose.rotation.sine.v.setZero();
-    moving.pose.position.x().v.setZero();
-    moving.pose.position.y().v.setZero();
-    moving.pose.angle.v.setZero();
-    for (int i = 0; i < 3; ++i) {
-      const double speed = before_[3 * body + i];
-      moving.twist[i] = s_.bodies[body].motion == Motion::kStatic
-                            ? LocalJet(speed)
-                            : twists->Add(speed, s_.TwistVariable(body, i));
-    }
-    return moving;
-  }
-
-  void RatesByTwist(const JointIndex& joint, internal::Locals* twists,
-                    JointRates<LocalJet>* rates) {
-    const MovingPose<LocalJet> a = ByTwist(joint.a, twists);
-    const MovingPose<LocalJet> b = ByTwist(joint.b, twists);
-    LocalJet numbers[7];
-    for (int i = 0; i < joint.num_geometry; ++i) {
-      numbers[i] = LocalJet(x_[joint.geometry + i]);
-    }
-    JointRows<LocalJet> rows;
-    EvaluateJointRates(joint.type, a, b, numbers, joint.num_geometry, &rows, rates);
-  }
-
-  void RatesByTwist(const ActiveContact& contact, internal::Locals* twists,
-                    ContactRates<LocalJet>* rates) {
-    if (contact.joint >= 0) {
-      JointRates<LocalJet> of_joint;
-      RatesByTwist(s_.joints[contact.joint], twists, &of_joint);
-      SetLimitRates(contact, of_joint, rates);
-      return;
-    }
-    const MovingPose<LocalJet> a = ByTwist(contact.a, twists);
-    const MovingPose<LocalJet> b = ByTwist(contact.b, twists);
-    internal::Locals numbers;  // not read: rates by shapes' numbers are emitted with the poses
-    const ShapeView<LocalJet> shape_a = LocalShapeOfA(contact, &numbers);
-    const ShapeView<LocalJet> shape_b = LocalShapeOfB(contact, &numbers);
-    for (std::vector<LocalJet>* values : {&scratch_.numbers_a, &scratch_.numbers_b}) {
-      for (LocalJet& x : *values) {
-        x.v.setZero();
-      }
-    }
-    ContactRows<LocalJet> rows;
-    EvaluateContactRates(contact.feature, shape_a, a, shape_b, b, &scratch_.rates, &rows, rates);
-  }
-
   const SolvedEquations& solved_;
   const bool by_hand_;
   Instant<LocalJet> at_;
@@ -766,6 +736,7 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
   const double* unknown_;  ///< v⁺, a or δ of all bodies
   const double* damped_;   ///< the twists that dampers act against
   internal::Locals locals_;
+  int share_ = 0;  ///< of a limit of a coupling: whose coordinate
   JointRows<LocalJet> joint_rows_;
   JointRates<LocalJet> joint_rates_;
   internal::Equations<kLevel, EntryBuilder> equations_;

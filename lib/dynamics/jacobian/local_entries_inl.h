@@ -8,6 +8,7 @@
 #include <cmath>
 #include <vector>
 
+#include "tangible/dynamics/elements/joint_coupling_inl.h"
 #include "tangible/dynamics/jacobian/equation_jacobian.h"
 #include "tangible/dynamics/model/driven_bodies.h"
 
@@ -93,12 +94,95 @@ class LocalEntries {
     }
   }
 
+  /// Of a joint other than a coupling.
   void LocalJointRows(const JointIndex& joint, Locals* locals, JointRows<LocalJet>* rows) {
     const Pose<LocalJet> pose_a = LocalPose(joint.a, locals);
     const Pose<LocalJet> pose_b = LocalPose(joint.b, locals);
     LocalJet numbers[7];
     LocalGeometry(joint, locals, numbers);
     EvaluateJoint(joint.type, pose_a, pose_b, numbers, rows);
+  }
+
+  /// Calls visit(joint, locals, rows) with the rows of a joint on its bodies, or with each share of
+  /// a coupling on those of the coupled joint.
+  template <typename Visit>
+  void ForEachShare(const JointIndex& joint, const Visit& visit) {
+    for (int k = 0; k < (joint.IsCoupling() ? 2 : 1); ++k) {
+      const JointIndex& of = joint.IsCoupling() ? s_.joints[joint.coupled[k]] : joint;
+      Locals locals;
+      JointRows<LocalJet> rows;
+      LocalJointRows(of, &locals, &rows);
+      if (joint.IsCoupling()) {
+        const LocalJet number = LocalNumber(joint.geometry + (k == 0 ? 1 : 0), &locals);
+        const LocalJet numbers[2] = {number, number};
+        ScaleToShare(joint.type, k, numbers, &rows);
+      }
+      visit(of, locals, rows);
+    }
+  }
+
+  /// A pose in double, with its twist as variables.
+  MovingPose<LocalJet> ByTwist(int body, Locals* twists) {
+    Locals constants;
+    MovingPose<LocalJet> moving{LocalPose(body, &constants), {}};
+    moving.pose.rotation.cosine.v.setZero();
+    moving.pose.rotation.sine.v.setZero();
+    moving.pose.position.x().v.setZero();
+    moving.pose.position.y().v.setZero();
+    moving.pose.angle.v.setZero();
+    for (int i = 0; i < 3; ++i) {
+      const double speed = state_.twist[3 * body + i];
+      moving.twist[i] = s_.bodies[body].motion == Motion::kStatic
+                            ? LocalJet(speed)
+                            : twists->Add(speed, s_.TwistVariable(body, i));
+    }
+    return moving;
+  }
+
+  void RatesByTwist(const JointIndex& joint, Locals* twists, JointRates<LocalJet>* rates) {
+    const MovingPose<LocalJet> a = ByTwist(joint.a, twists);
+    const MovingPose<LocalJet> b = ByTwist(joint.b, twists);
+    LocalJet numbers[7];
+    for (int i = 0; i < joint.num_geometry; ++i) {
+      numbers[i] = LocalJet(x_[joint.geometry + i]);
+    }
+    JointRows<LocalJet> rows;
+    EvaluateJointRates(joint.type, a, b, numbers, joint.num_geometry, &rows, rates);
+  }
+
+  /// The rate of coordinate k of a coupling, times its factor.
+  void ShareRatesByTwist(const JointIndex& coupling, int k, Locals* twists,
+                         JointRates<LocalJet>* rates) {
+    RatesByTwist(s_.joints[coupling.coupled[k]], twists, rates);
+    if (k == 1) rates->coordinate *= LocalJet(x_[coupling.geometry]);
+  }
+
+  /// `share`: of a limit of a coupling, whose coordinate.
+  void RatesByTwist(const ActiveContact& contact, int share, Locals* twists,
+                    ContactRates<LocalJet>* rates) {
+    if (contact.joint >= 0) {
+      const JointIndex& joint = s_.joints[contact.joint];
+      JointRates<LocalJet> of_joint;
+      if (joint.IsCoupling()) {
+        ShareRatesByTwist(joint, share, twists, &of_joint);
+      } else {
+        RatesByTwist(joint, twists, &of_joint);
+      }
+      SetLimitRates(contact, of_joint, rates);
+      return;
+    }
+    const MovingPose<LocalJet> a = ByTwist(contact.a, twists);
+    const MovingPose<LocalJet> b = ByTwist(contact.b, twists);
+    Locals numbers;  // not read: rates by shapes' numbers are emitted with the poses
+    const ShapeView<LocalJet> shape_a = LocalShapeOfA(contact, &numbers);
+    const ShapeView<LocalJet> shape_b = LocalShapeOfB(contact, &numbers);
+    for (std::vector<LocalJet>* values : {&scratch_.numbers_a, &scratch_.numbers_b}) {
+      for (LocalJet& x : *values) {
+        x.v.setZero();
+      }
+    }
+    ContactRows<LocalJet> rows;
+    EvaluateContactRates(contact.feature, shape_a, a, shape_b, b, &scratch_.rates, &rows, rates);
   }
 
   /// The shape parameters that the feature reads, as LocalJets in their places.

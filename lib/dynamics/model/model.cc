@@ -18,9 +18,10 @@ namespace {
 int NumGeometryNumbers(JointType type) {
   switch (type) {
     case JointType::kPrismatic:
+      return 7;
     case JointType::kCoupling:
     case JointType::kLimitedCoupling:
-      return 7;
+      return 2;
     case JointType::kFixedAngle:
       return 1;
     default:
@@ -141,9 +142,9 @@ JointType ModelType(const BasicJoint<T>& joint) {
 
 // Whether rows of joints may be dependent. All fixed bodies are one node of a graph in which a
 // joint may close a cycle. Where none does, the coordinates of the joints are independent, and
-// couplings are if they close no cycle among these.
-template <typename T>
-bool HasJointLoops(const BasicScene<T>& scene, const ModelStructure& structure) {
+// couplings are if they close no cycle among these. A rope has no rows, but a coordinate, which is
+// independent if the rope closes no cycle.
+bool HasJointLoops(const ModelStructure& structure) {
   DisjointSets nodes, coordinates;
   nodes.AddAll(structure.bodies.size());
   coordinates.AddAll(structure.joints.size());
@@ -151,12 +152,17 @@ bool HasJointLoops(const BasicScene<T>& scene, const ModelStructure& structure) 
     return structure.bodies[body].block >= 0 ? body : structure.world();
   };
   bool loops = false;
+  std::vector<bool> is_coupled(structure.joints.size(), false);
+  for (const JointIndex& joint : structure.joints) {
+    for (const int coupled : joint.coupled) {
+      if (coupled >= 0) is_coupled[coupled] = true;
+    }
+  }
   for (size_t j = 0; j < structure.joints.size(); ++j) {
     const JointIndex& joint = structure.joints[j];
-    if (joint.rows == 0) continue;
-    const int* coupled = scene.joints[j].coupled;
+    if (joint.rows == 0 && !(joint.type == JointType::kRope && is_coupled[j])) continue;
     const bool joins = joint.type == JointType::kCoupling
-                           ? coordinates.Join(coupled[0], coupled[1])
+                           ? coordinates.Join(joint.coupled[0], joint.coupled[1])
                            : nodes.Join(node(joint.a), node(joint.b));
     loops = loops || !joins;
   }
@@ -173,7 +179,8 @@ void AddJoints(const BasicScene<T>& scene, Places* places, ModelStructure* struc
     index.is_angular = joint.type == JointType::kRevolute;
     int ends[2] = {joint.bodies[0], joint.bodies[1]};
     if (joint.type == JointType::kCoupling) {
-      std::copy_n(FormOf(scene, joint).bodies, 2, ends);
+      std::copy_n(EndsOf(scene, joint).bodies, 2, ends);
+      std::copy_n(joint.coupled, 2, index.coupled);
       index.is_angular = scene.joints[joint.coupled[0]].type == JointType::kRevolute;
     }
     index.a = ends[0] < 0 ? world : ends[0];
@@ -193,6 +200,10 @@ void AddJoints(const BasicScene<T>& scene, Places* places, ModelStructure* struc
             static_cast<int>(structure->joints.size());
       }
     }
+    if (joint.until) {
+      index.until = places->Take(1);
+      structure->has_releases = true;
+    }
     if (joint.limits) {
       index.low = Limits(joint.limits->first) ? places->Take(1) : -1;
       index.high = Limits(joint.limits->second) ? places->Take(1) : -1;
@@ -208,7 +219,7 @@ void AddJoints(const BasicScene<T>& scene, Places* places, ModelStructure* struc
     }
   }
   std::sort(structure->joined.begin(), structure->joined.end());
-  structure->joint_loops = HasJointLoops(scene, *structure);
+  structure->joint_loops = HasJointLoops(*structure);
 }
 
 template <typename T>
@@ -326,12 +337,11 @@ void FillBodies(const BasicScene<T>& scene, std::vector<T>* numbers) {
 // The geometry of a joint as JointIndex lists it. The value of a coupling at time 0 is set where
 // joints have been turned.
 template <typename T>
-void FillGeometry(const BasicScene<T>& scene, const BasicJoint<T>& joint, const State<T>& drawn,
-                  int world, std::vector<T>* numbers) {
+void FillGeometry(const BasicJoint<T>& joint, const State<T>& drawn, int world,
+                  std::vector<T>* numbers) {
   using std::sqrt;
   if (joint.type == JointType::kCoupling) {
-    const CouplingForm<T> form = FormOf(scene, joint);
-    for (const auto& row : form.row) numbers->insert(numbers->end(), row, row + 3);
+    numbers->push_back(joint.ratio);
     numbers->push_back(T(0.0));
     return;
   }
@@ -360,7 +370,7 @@ template <typename T>
 void FillJoints(const BasicScene<T>& scene, const State<T>& drawn, int world,
                 std::vector<T>* numbers) {
   for (const BasicJoint<T>& joint : scene.joints) {
-    FillGeometry(scene, joint, drawn, world, numbers);
+    FillGeometry(joint, drawn, world, numbers);
     if (joint.type == JointType::kRevolute || joint.type == JointType::kPrismatic) {
       numbers->push_back(joint.damping);
       numbers->push_back(joint.effort);
@@ -381,6 +391,7 @@ void FillJoints(const BasicScene<T>& scene, const State<T>& drawn, int world,
       }
       FillServo(joint.effort_servo, numbers);
     }
+    if (joint.until) numbers->push_back(*joint.until);
     if (joint.limits) {
       if (Limits(joint.limits->first)) numbers->push_back(joint.limits->first);
       if (Limits(joint.limits->second)) numbers->push_back(joint.limits->second);
@@ -389,17 +400,32 @@ void FillJoints(const BasicScene<T>& scene, const State<T>& drawn, int world,
   }
 }
 
+// The coordinate of a joint at time 0: of a hinge or slider that with which it starts, of a rope
+// the distance of its ends.
+template <typename T>
+T InitialCoordinate(const Model<T>& model, const State<T>& state, const BasicJoint<T>& joint,
+                    const JointIndex& index) {
+  using std::sqrt;
+  if (index.type != JointType::kRope) return joint.angle;
+  const T* x = &model.parameters[index.geometry];
+  const Vector2<T> apart = state.PoseOf(index.a) * Vector2<T>(x[0], x[1]) -
+                           state.PoseOf(index.b) * Vector2<T>(x[2], x[3]);
+  const T squared = apart.squaredNorm();
+  return ValueOf(squared) > 0.0 ? T(sqrt(squared)) : T(0.0);
+}
+
 // The value that a coupling keeps, or that its limits are measured from.
 template <typename T>
-void SetCoupledValues(const State<T>& state, Model<T>* model) {
-  for (const JointIndex& joint : model->structure->joints) {
-    if (joint.type != JointType::kCoupling && joint.type != JointType::kLimitedCoupling) continue;
+void SetCoupledValues(const BasicScene<T>& scene, const State<T>& state, Model<T>* model) {
+  const std::vector<JointIndex>& joints = model->structure->joints;
+  for (const JointIndex& joint : joints) {
+    if (!joint.IsCoupling()) continue;
+    const auto coordinate = [&](int k) {
+      const int of = joint.coupled[k];
+      return InitialCoordinate(*model, state, scene.joints[of], joints[of]);
+    };
     T* const numbers = &model->parameters[joint.geometry];
-    numbers[6] = T(0.0);
-    for (int i = 0; i < 3; ++i) {
-      numbers[6] +=
-          numbers[i] * state.pose[3 * joint.a + i] + numbers[3 + i] * state.pose[3 * joint.b + i];
-    }
+    numbers[1] = coordinate(0) + numbers[0] * coordinate(1);
   }
 }
 
@@ -528,7 +554,7 @@ void BuildModelWithStructure(const BasicScene<T>& scene,
   FillJoints(scene, *state, world, &model->parameters);
   FillForcesAndPairs(scene, *state, world, &model->parameters);
   ApplyInitialJoints(scene, state);
-  SetCoupledValues(*state, model);
+  SetCoupledValues(scene, *state, model);
   if constexpr (std::is_same_v<T, double>) {
     FindModelSeams(*state, model);
   }

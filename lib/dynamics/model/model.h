@@ -68,18 +68,20 @@ struct PartPair {
 ///   kPrismatic        anchor in a's frame (2), in b's (2), unit axis in b's (2), angle
 ///   kDistance, kRope  anchor in a's frame (2), in b's frame (2), length
 ///   kFixedAngle       angle as drawn
-///   kCoupling, kLimitedCoupling  row on a's pose (3), on b's (3), value at time 0
+///   kCoupling, kLimitedCoupling  ratio, value at time 0
 /// The angle as drawn is angle_a − angle_b at time 0, before the joint's initial angle is applied.
 struct JointIndex {
   std::string name;
   JointType type = JointType::kRevolute;
-  int a = -1, b = -1;  ///< bodies; the world has an index too
+  int a = -1, b = -1;         ///< bodies; the world has an index too
+  int coupled[2] = {-1, -1};  ///< of a coupling: two joints
   int rows = 0;
   int geometry = -1;
   int num_geometry = 0;
   int damping = -1, effort = -1;  ///< −1: none of this type
   int low = -1, high = -1;        ///< −1: not limited on that side
   int limit_restitution = -1;     ///< −1: 0
+  int until = -1;                 ///< the time from which it does nothing; −1: none
   int motor = -1;                 ///< its speed, then its limit; −1: none
   int stiffness = -1;             ///< then the coordinate at rest; −1: no spring
   /// The force or torque at which it slides; −1: none. With Stribeck's decay the kinetic friction
@@ -89,6 +91,9 @@ struct JointIndex {
   int effort_signal = -1;   ///< into signals; replaces effort
   bool is_angular = false;  ///< whether its coordinate is an angle, rad; else it is a length, m
   bool HasLimits() const { return low >= 0 || high >= 0; }
+  bool IsCoupling() const {
+    return type == JointType::kCoupling || type == JointType::kLimitedCoupling;
+  }
 };
 
 /// Local anchors (2 + 2), stiffness, damping, rest length: seven parameters from `numbers` on.
@@ -153,6 +158,7 @@ struct ModelStructure {
   std::vector<std::pair<int, int>> joined;  ///< bodies with a joint without contact, ascending
   std::vector<int> moving;                  ///< body of each block
   bool joint_loops = false;
+  bool has_releases = false;     ///< whether joints end at a time
   bool friction_decays = false;  ///< whether the friction of some contact may (contact.h)
   int num_parameters = 0;
 

@@ -94,9 +94,11 @@ class PartTaker {
   }
 
   void TakeJoints() {
+    std::vector<int> local_joint(whole_.joints.size(), -1);
     for (size_t j = 0; j < whole_.joints.size(); ++j) {
       if (!Moves(whole_.joints[j].a) && !Moves(whole_.joints[j].b)) continue;
       JointIndex& index = to_->joints.emplace_back(whole_.joints[j]);
+      local_joint[j] = static_cast<int>(part_.joints.size());
       part_.joints.push_back(static_cast<int>(j));
       index.a = local_[index.a];
       index.b = local_[index.b];
@@ -109,8 +111,14 @@ class PartTaker {
       TakeOne(&index.low);
       TakeOne(&index.high);
       TakeOne(&index.limit_restitution);
+      TakeOne(&index.until);
+      to_->has_releases = to_->has_releases || index.until >= 0;
       TakeSignal(&index.effort_signal);
       TakeServos(&ServoIndex::joint, j, to_->joints.size() - 1);
+    }
+    // Joints that are coupled have moving bodies, which are bodies of the coupling.
+    for (JointIndex& index : to_->joints) {
+      for (int& coupled : index.coupled) coupled = coupled < 0 ? -1 : local_joint[coupled];
     }
     to_->joint_loops = whole_.joint_loops && !to_->joints.empty();
     for (const auto& [a, b] : whole_.joined) {

@@ -46,11 +46,12 @@ struct ModelPart {
       }
     }
   }
-  /// The part's state out of the whole one.
+  /// The part's poses and twists out of the whole ones.
   template <typename T>
   void GatherState(const State<T>& whole, State<T>* own) const {
     own->pose.resize(3 * bodies.size());
     own->twist.resize(3 * bodies.size());
+    own->released.clear();
     for (size_t k = 0; k < bodies.size(); ++k) {
       std::copy_n(&whole.pose[3 * bodies[k]], 3, &own->pose[3 * k]);
       std::copy_n(&whole.twist[3 * bodies[k]], 3, &own->twist[3 * k]);

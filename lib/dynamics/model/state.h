@@ -19,6 +19,8 @@ struct State {
   /// During a motion without events: of each servo 0, or the sign of the bound at which it is held
   /// (servo.h). Empty: by its coordinate and rate.
   std::vector<signed char> servo_modes{};
+  /// Of each joint whether it has been released (model_releases.h). Empty: none.
+  std::vector<char> released{};
 
   Pose<T> PoseOf(int body) const {
     return Pose<T>(Vector2<T>(pose[3 * body], pose[3 * body + 1]), pose[3 * body + 2]);
@@ -37,6 +39,7 @@ State<double> ValuesOf(const State<T>& state) {
     values.twist.push_back(ValueOf(x));
   }
   values.servo_modes = state.servo_modes;
+  values.released = state.released;
   return values;
 }
 

@@ -341,6 +341,35 @@ void RolloutCertifier::AddForceWindows(const Model<double>& model) {
   }
 }
 
+// Ends of joints as parameters. A fixed step has a joint or has it not, so that the derivative is
+// that of the discrete map, and where a step begins at the joint's end the map jumps.
+void RolloutCertifier::AddReleases(const Model<double>& model) {
+  const SimulationSettings& settings = model.structure->settings;
+  const double near =
+      kSameInstant * settings.dt + kCoordinateRounding * std::abs(settings.duration);
+  for (const JointIndex& joint : model.structure->joints) {
+    if (joint.until < 0 || !Wanted(joint.until)) continue;
+    const double time = model.parameters[joint.until];
+    const std::string which = "end of joint " + joint.name + " at " + Short(time);
+    if (settings.stepping == Stepping::kFixed) {
+      const bool acts = time > 0.0 && time < settings.duration;
+      if (acts && certificate_.discrete_map.empty()) certificate_.discrete_map = which + " s";
+      if (acts && certificate_.discrete_impact.empty()) {
+        certificate_.discrete_impact = which + " s";
+      }
+      const double k =
+          std::clamp(std::round(time / settings.dt), 0.0, static_cast<double>(NumSteps(settings)));
+      if (landing_.empty() && std::abs(time - StepTime(settings, static_cast<long>(k))) <= near) {
+        landing_ = which + " s is on a step's boundary";
+      }
+    } else if (std::abs(time) <= near) {
+      OneSided(which + " s is the start of the run");
+    } else if (std::abs(time - settings.duration) <= near) {
+      OneSided(which + " s is the end of the run");
+    }
+  }
+}
+
 // Jumps of a path's rate at which the derivative by its delay has two sides.
 void RolloutCertifier::AddPaths(const Model<double>& model) {
   const ModelStructure& s = *model.structure;
@@ -369,6 +398,7 @@ void RolloutCertifier::AddPaths(const Model<double>& model) {
 
 Certificate RolloutCertifier::Finish(const Model<double>& model, const RolloutReport& report) {
   AddForceWindows(model);
+  AddReleases(model);
   AddPaths(model);
   certificate_.mode_switches = static_cast<int>(report.mode_switches);
   certificate_.events = static_cast<int>(report.events);

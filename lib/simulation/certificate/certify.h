@@ -129,6 +129,7 @@ class RolloutCertifier {
                    ContactSystem* system);
   void AddLinearSystem(const StepRecord& record, ContactSystem* system);
   void AddForceWindows(const Model<double>& model);
+  void AddReleases(const Model<double>& model);
   void AddPaths(const Model<double>& model);
   bool Wanted(int number) const;
   /// The directions of the variables of the island that is looked at.

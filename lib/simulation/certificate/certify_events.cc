@@ -303,7 +303,7 @@ void RolloutCertifier::AddTouchesAtEnd(const Model<double>& model, long step, co
   }
   std::vector<ActiveContact> near;
   search.FindContacts(model, last.after, reach, &near);
-  AppendLimits(model, &near);
+  AppendLimits(model, last.after, &near);
   for (const ActiveContact& contact : near) {
     const bool is_closed = std::any_of(last.contacts.begin(), last.contacts.end(),
                                        [&](const ActiveContact& c) { return c.SameAs(contact); });

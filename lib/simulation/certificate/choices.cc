@@ -123,7 +123,7 @@ const char* WhatChanges(ChoiceKind kind) {
     case ChoiceKind::kRecovery:
       return "limit of the recovery speed";
     case ChoiceKind::kWindow:
-      return "a force's window at a step's boundary";
+      return "a force's window or the end of a joint at a step's boundary";
     case ChoiceKind::kEvent:
       return "an event that leaves the run";
     case ChoiceKind::kAfterEnd:
@@ -239,6 +239,25 @@ void ChoiceWatch::AddFixed(const Model<double>& model, long step, Stepper* stepp
   }
   last_contacts_ = record.contacts;
   AddServos(model, step, record);
+  if (model.structure->has_releases) AddReleases(model, step, record);
+}
+
+void ChoiceWatch::AddReleases(const Model<double>& model, long step, const StepRecord& record) {
+  const ModelStructure& s = *model.structure;
+  for (size_t j = 0; j < s.joints.size(); ++j) {
+    if (s.joints[j].until < 0) continue;
+    const double until = model.parameters[s.joints[j].until];
+    const bool has_ended = record.before.released[j] != 0;
+    // Of the steps without the joint the first one decides.
+    if (has_ended && until < record.time - s.settings.dt) continue;
+    ActiveContact contact;
+    contact.a = s.joints[j].a;
+    contact.b = s.joints[j].b;
+    contact.joint = static_cast<int>(j);
+    const double slack = std::abs(record.time - until);
+    Push({KeyOf(ChoiceKind::kWindow, step, has_ended ? 1 : 0, contact), contact, record.time, slack,
+          std::abs(record.time) + std::abs(until), has_ended});
+  }
 }
 
 void ChoiceWatch::AddApproached(const Model<double>& model, long step, const StepRecord& record,

@@ -31,7 +31,7 @@ enum class ChoiceKind : unsigned char {
   kThreshold,      ///< the speed above which an impact rebounds
   kReach,          ///< whether a free motion reaches the surface within a step
   kRecovery,       ///< the speed at which bodies leave penetration
-  kWindow,         ///< the step in which a force's window opens or closes
+  kWindow,         ///< the step in which a force's window opens or closes, or a joint ends
   kEvent,          ///< an event before the end of the run
   kAfterEnd,       ///< an event just behind the end of the run
   kOrder,          ///< which of two events is first
@@ -102,6 +102,8 @@ class ChoiceWatch {
     ChoiceList pending;            ///< in the order of time
   };
   void AddFixed(const Model<double>& model, long step, Stepper* stepper);
+  /// The first step without a joint that ends, and how far the others are from being it.
+  void AddReleases(const Model<double>& model, long step, const StepRecord& record);
   void AddServos(const Model<double>& model, long step, const StepRecord& record);
   void AddLaw(const Model<double>& model, long step, const StepRecord& record, size_t i);
   /// A contact that the step before was too far from its surface to look at.

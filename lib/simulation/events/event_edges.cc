@@ -40,6 +40,16 @@ void ForEachWindowEdge(const ModelStructure& structure, const Visit& visit) {
     if (force.start >= 0) visit(WindowEdge{force.start, static_cast<int>(k), -1.0});
     if (force.end >= 0) visit(WindowEdge{force.end, static_cast<int>(k), 1.0});
   }
+  for (const JointIndex& joint : structure.joints) {
+    if (joint.until >= 0) visit(WindowEdge{joint.until});
+  }
+}
+
+// Whether the edge is the end of a joint.
+bool IsRelease(const ModelStructure& s, const Edge& edge) {
+  return std::any_of(s.joints.begin(), s.joints.end(), [&](const JointIndex& joint) {
+    return joint.until >= 0 && joint.until == edge.window.number;
+  });
 }
 
 }  // namespace
@@ -148,7 +158,7 @@ double JustAfter(const Model<double>& model, double t) {
 
 std::string CoincidingEdges(const Model<double>& model, const RowMatrixXd& directions) {
   const ModelStructure& s = *model.structure;
-  if (s.paths.empty() || s.settings.stepping == Stepping::kFixed) return "";
+  if ((s.paths.empty() && !s.has_releases) || s.settings.stepping == Stepping::kFixed) return "";
   std::vector<Edge> edges;
   ForEachKnot(model, 0.0, s.settings.duration, [&](const Edge& edge) {
     if (!edge.gives_way) edges.push_back(edge);
@@ -158,17 +168,22 @@ std::string CoincidingEdges(const Model<double>& model, const RowMatrixXd& direc
   });
   std::sort(edges.begin(), edges.end(),
             [](const Edge& x, const Edge& y) { return x.time < y.time; });
-  const auto varies = [&](const Edge& edge) {
-    return !directions.row(s.ParameterVariable(edge.window.number)).isZero(0.0);
+  const auto row = [&](const Edge& edge) {
+    return directions.row(s.ParameterVariable(edge.window.number));
   };
+  const auto varies = [&](const Edge& edge) { return !row(edge).isZero(0.0); };
   for (size_t i = 1; i < edges.size(); ++i) {
     const Edge& a = edges[i - 1];
     const Edge& b = edges[i];
     if (a.window.number == b.window.number || !IsSameInstant(s, a.time, b.time)) continue;
     if (a.window.force >= 0 && b.window.force >= 0) continue;
     if (a.time <= 0.0 || (!varies(a) && !varies(b))) continue;
+    if (row(a) == row(b) && IsRelease(s, a) && IsRelease(s, b)) continue;  // they vary alike
     const auto name = [&](const Edge& edge) {
       if (edge.window.force >= 0) return "the window of force " + s.forces[edge.window.force].name;
+      for (const JointIndex& joint : s.joints) {
+        if (joint.until == edge.window.number) return "the end of joint " + joint.name;
+      }
       const auto index = std::find_if(s.paths.begin(), s.paths.end(), [&](const PathIndex& path) {
         return path.numbers == edge.window.number - kPathDelay;
       });
@@ -176,10 +191,10 @@ std::string CoincidingEdges(const Model<double>& model, const RowMatrixXd& direc
     };
     char time[40];
     std::snprintf(time, sizeof time, "%.9g", b.time);
-    return "expected jumps of paths at times of their own where their derivatives are asked for, "
-           "got " +
+    return "expected jumps of paths and ends of joints at times of their own where their "
+           "derivatives are asked for, got " +
            name(a) + " and " + name(b) + ", which both change at t = " + time +
-           " s: the derivative depends on their order (set one delay a little apart)";
+           " s: the derivative depends on their order (set one a little apart)";
   }
   return "";
 }

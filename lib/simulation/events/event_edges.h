@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Edges: the given times at which a force's window opens or closes, or a signal or a body's path
-// has a corner.
+// Edges: the given times at which a force's window opens or closes, a joint ends, or a signal or a
+// body's path has a corner.
 //
 // A segment that ends at an edge s has the length s − t, and the next one starts at s. With S_τ⁻
 // and S_τ⁺ the rates of both motions, which differ by the force and by what it changes,
@@ -16,6 +16,10 @@
 // fall on one instant, there is a segment of zero length between each two of them, with the modes
 // that contacts have between them (AddFurtherEdges). If another order gives other accelerations the
 // derivative differs on each side, and the segment names the edge at its start.
+//
+// A joint that ends is released at the edge (model_releases.h): twists go on, and accelerations
+// jump. Where the edge of a window or of another joint is at the same instant, the derivatives
+// depend on the order, and those by numbers that vary apart are refused (CoincidingEdges).
 //
 // A knot of a path is an edge at knot + delay. Where the rate jumps there (driven_bodies.h) the
 // bodies that touch the driven one, or are joined to it, meet its new twist by an impact as soon as
@@ -70,8 +74,8 @@ double JustBefore(const Model<double>& model, double t);
 double JustAfter(const Model<double>& model, double t);
 
 /// Empty, or why derivatives along these directions (num_variables x columns) are refused: the time
-/// of a jump of a path's rate and another edge's are the same, though both vary by numbers of their
-/// own, and what the impacts there do depends on their order. Empty for fixed steps.
+/// of a jump of a path's rate or of a joint's end and another edge's are the same, though both vary
+/// by numbers of their own, and what follows depends on their order. Empty for fixed steps.
 std::string CoincidingEdges(const Model<double>& model, const RowMatrixXd& directions);
 
 }  // namespace tangible

@@ -162,10 +162,15 @@ bool EventStepper::FollowAfter(const Model<double>& model, double now, State<dou
 }
 
 Segment* EventStepper::AddEdge(const Model<double>& model, double t, double middle,
-                               std::vector<WindowEdge> to_come, const State<double>& state,
+                               std::vector<WindowEdge> to_come, const State<double>& given,
                                StepReport* outcome) {
   const EventGuess guess = guess_;
   const int parts = record_.num_parts;
+  if (model.structure->has_releases) {
+    before_edge_ = given;
+    SetReleased(model, middle, &before_edge_);
+  }
+  const State<double>& state = model.structure->has_releases ? before_edge_ : given;
   Segment& segment = BeginSegment(t, t, state);
   segment.middle = middle;
   segment.further_edges = std::move(to_come);

@@ -35,8 +35,9 @@ class EventReplay {
         started = true;
       }
       FollowPaths(model_, now, part.inside(), state);
-      state->servo_modes =
-          (part.is_impulses ? part.impulses.before : part.segment.before).servo_modes;
+      const State<double>& before = part.is_impulses ? part.impulses.before : part.segment.before;
+      state->servo_modes = before.servo_modes;
+      state->released = before.released;
       if (part.is_impulses) {
         RunImpulses(&part.impulses, state);
       } else {
@@ -280,6 +281,7 @@ class EventReplay {
     jets.pose = JetsOf(state.pose);
     jets.twist = JetsOf(state.twist);
     jets.servo_modes = state.servo_modes;
+    jets.released = state.released;
     return jets;
   }
 

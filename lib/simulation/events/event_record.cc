@@ -6,7 +6,7 @@ namespace {
 
 size_t BytesOf(const State<double>& state) {
   return sizeof(double) * (state.pose.capacity() + state.twist.capacity()) +
-         state.servo_modes.capacity();
+         state.servo_modes.capacity() + state.released.capacity();
 }
 
 // Bytes without the node itself, which is stored in a vector.

@@ -50,7 +50,7 @@ struct Impulses : StepRecord {
 
 enum class EventKind : unsigned char {
   kStepEnd,     ///< no event: the end of the step
-  kEdge,        ///< a force's window opens or closes, or a signal or path has a corner
+  kEdge,        ///< a force's window opens or closes, a joint ends, a signal or path has a corner
   kTouch,       ///< a gap or the distance from a joint limit closes
   kSlipEnds,    ///< a sliding speed reaches 0
   kSlipBegins,  ///< friction reaches its limit (Segment::SticksWith)
@@ -66,10 +66,11 @@ const char* NameOf(EventKind event);
 /// Whether an event's time is found from an equation (and not given).
 bool IsLocated(EventKind kind);
 
-/// An end of a force's window or a knot of a path: the parameter that sets its time, −1: none.
+/// An end of a force's window, the end of a joint, or a knot of a path: the parameter that sets its
+/// time, −1: none.
 struct WindowEdge {
   int number = -1;
-  int force = -1;  ///< −1: a knot of a path, whose time is that of the knot later by the number
+  int force = -1;     ///< −1: of a joint, or of a path, whose time is the knot's and the number
   double side = 0.0;  ///< −1: the window opens there, 1: it closes
 };
 

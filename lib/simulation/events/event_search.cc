@@ -510,7 +510,7 @@ bool EventSearch::Run(const Model<double>& model, const std::vector<ActiveContac
   for (size_t j = 0; j < model.structure->joints.size(); ++j) {
     const JointIndex& joint = model.structure->joints[j];
     for (const double side : {1.0, -1.0}) {
-      if (!HasLimit(model, joint, side)) continue;
+      if (!HasLimit(model, segment->before, joint, side)) continue;
       if (event.kind != EventKind::kAtOnce) SearchLimit(model, static_cast<int>(j), side, &event);
     }
   }

@@ -739,6 +739,7 @@ StepReport EventStepper::Advance(const Model<double>& model, double t, double h,
   shortened_.Clear();
   search_.StartStep(model, t, h, *state);
   AddEdgesAtStart(model, t, *state, &outcome);
+  SetReleased(model, JustAfter(model, t), state);
   const std::vector<Edge> edges = EdgesWithin(model, t, t + h);
   const double end = t + h;
   double now = t;
@@ -779,6 +780,7 @@ StepReport EventStepper::Advance(const Model<double>& model, double t, double h,
       outcome.events += EndAtGivenTime(now < goal, next, &segment);
       if (now < goal) continue;
       AddFurtherEdges(model, now, next, *state, &outcome);
+      if (next.any) SetReleased(model, JustAfter(model, now), state);
       if (next.any && !FollowAfter(model, now, state, &outcome)) return fail();
       continue;
     }

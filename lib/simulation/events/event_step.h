@@ -166,7 +166,7 @@ class EventStepper {
   /// A segment of zero length up to an edge, with the forces at `middle` and edges of windows that
   /// are still to come; null where there are no accelerations.
   Segment* AddEdge(const Model<double>& model, double t, double middle,
-                   std::vector<WindowEdge> to_come, const State<double>& state,
+                   std::vector<WindowEdge> to_come, const State<double>& given,
                    StepReport* outcome);
   /// Those for edges of windows on the step's start.
   void AddEdgesAtStart(const Model<double>& model, double t, const State<double>& state,
@@ -225,6 +225,7 @@ class EventStepper {
   EventRecord record_;
   double inside_ = 0.0;  ///< the time that tells the pieces on which paths are followed
   AssemblyScratch<double> assembly_;
+  State<double> before_edge_;  ///< with the joints that end at the edge
   Touching touching_;
   std::vector<bool> rebounds_;  ///< of the last impact's contacts
   DecompressionSolver decompression_;

@@ -104,7 +104,7 @@ void EventStepper::FindTouching(const Model<double>& model, const State<double>&
     }
   }
   found.clear();
-  AppendLimits(model, &found);
+  AppendLimits(model, state, &found);
   for (ActiveContact& limit : found) {
     ContactRows<double> rows;
     EvaluateActiveRows(model, state, limit, &rows);
@@ -114,7 +114,7 @@ void EventStepper::FindTouching(const Model<double>& model, const State<double>&
     }
   }
   found.clear();
-  AppendJointFriction(model, &found);
+  AppendJointFriction(model, state, &found);
   for (const ActiveContact& contact : found) {
     AddTouching(model, state, contact);
   }

@@ -28,7 +28,9 @@ class LoadScan {
   double Run() {
     for (const ForceIndex& force : s_.forces) Force(force);
     for (const SpringIndex& spring : s_.springs) Spring(spring);
-    for (const JointIndex& joint : s_.joints) Joint(joint);
+    for (const JointIndex& joint : s_.joints) {
+      if (!IsReleased(s_, state_, joint)) Joint(joint);
+    }
     for (const PathIndex& path : s_.paths) Path(path);
     for (int k = 0; k < static_cast<int>(s_.servos.size()); ++k) Servo(k);
     return fastest_;

@@ -88,7 +88,7 @@ bool DriftsFar(const Model<double>& model, const ContactProblem<double>& correct
   for (size_t j = 0; j < correction.joints.size(); ++j) {
     const JointIndex& joint = model.structure->joints[j];
     const double* anchors = &model.parameters[joint.geometry];
-    if (joint.type != JointType::kRevolute) {
+    if (joint.type != JointType::kRevolute || correction.joints[j].rows == 0) {
       continue;
     }
     const double arms =

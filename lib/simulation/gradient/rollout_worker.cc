@@ -68,7 +68,7 @@ bool RolloutWorker::Set(const RolloutInput& input, RolloutOutput* output) {
 
 bool RolloutWorker::SetForDerivatives(const RolloutInput& input, RolloutOutput* output) {
   if (!Set(input, output)) return false;
-  if (model_.structure->paths.empty()) return true;
+  if (model_.structure->paths.empty() && !model_.structure->has_releases) return true;
   output->message = CoincidingEdges(model_, RowMatrixXd(ParameterJacobian()));
   if (output->message.empty()) return true;
   output->status = RolloutStatus::kRefused;

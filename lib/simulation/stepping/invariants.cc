@@ -61,7 +61,7 @@ double PotentialEnergy(const Model<double>& model, const State<double>& state) {
               (row.length - model.parameters[spring.numbers + SpringIndex::kRestLength]);
   }
   for (const JointIndex& joint : s.joints) {
-    if (joint.stiffness >= 0) {
+    if (joint.stiffness >= 0 && !IsReleased(s, state, joint)) {
       JointRows<double> rows;
       EvaluateJoint(joint.type, state.PoseOf(joint.a), state.PoseOf(joint.b),
                     &model.parameters[joint.geometry], &rows);

@@ -67,8 +67,8 @@ void JointWatch::Look(const Model<double>& model, const State<double>& state, do
   const std::vector<JointIndex>& joints = model.structure->joints;
   for (size_t j = 0; j < sizes_.size(); ++j) {
     JointRows<double> rows;
-    EvaluateJoint(joints[j].type, state.PoseOf(joints[j].a), state.PoseOf(joints[j].b),
-                  &model.parameters[joints[j].geometry], &rows);
+    EvaluateJoint(model, state, joints[j], &rows);
+    if (rows.rows == 0) continue;
     const JointError error = ErrorOf(joints[j], rows);
     const double opening = std::fmax(error.distance / sizes_[j], error.angle);
     if (!(opening > opening_ && std::isfinite(opening))) continue;

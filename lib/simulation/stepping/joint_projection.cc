@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tangible/dynamics/elements/joint_coupling_inl.h"
 #include "tangible/simulation/stepping/projection_descent.h"
 
 namespace tangible {
@@ -24,8 +25,7 @@ double JointDrift(const Model<double>& model, const State<double>& state) {
   double largest = 0.0;
   for (const JointIndex& joint : model.structure->joints) {
     JointRows<double> rows;
-    EvaluateJoint(joint.type, state.PoseOf(joint.a), state.PoseOf(joint.b),
-                  &model.parameters[joint.geometry], &rows);
+    EvaluateJoint(model, state, joint, &rows);
     for (int k = 0; k < rows.rows; ++k) {
       largest = std::max(largest, std::abs(rows.error[k]));
     }
@@ -82,41 +82,62 @@ void JointProjection::Visit(const Model<double>& model, const Sink& sink) {
   }
   for (size_t j = 0; j < s.joints.size(); ++j) {
     const JointIndex& joint = s.joints[j];
-    // Locals: pose of a, pose of b, geometry.
-    int variables[kLocalJetWidth];
-    for (int i = 0; i < 3; ++i) {
-      variables[i] = s.PoseVariable(joint.a, i);
-      variables[3 + i] = s.PoseVariable(joint.b, i);
+    if (IsReleased(at, static_cast<int>(j))) continue;
+    for (int k = 0; k < (joint.IsCoupling() ? 2 : 1); ++k) {
+      VisitShare(model, static_cast<int>(j), k, sink);
     }
-    LocalJet numbers[7];
-    for (int i = 0; i < joint.num_geometry; ++i) {
-      variables[6 + i] = s.ParameterVariable(joint.geometry + i);
-      numbers[i] = LocalJet(model.parameters[joint.geometry + i], 6 + i);
+  }
+}
+
+// Those of joint j, or of the share of coordinate k of a coupling.
+template <typename Sink>
+void JointProjection::VisitShare(const Model<double>& model, int j, int k, const Sink& sink) {
+  const ModelStructure& s = *model.structure;
+  const int nb = s.num_blocks();
+  const State<double>& at = iterate_.at;
+  const bool couples = s.joints[j].IsCoupling();
+  const JointIndex& joint = couples ? s.joints[s.joints[j].coupled[k]] : s.joints[j];
+  // Locals: pose of a, pose of b, geometry.
+  int variables[kLocalJetWidth];
+  for (int i = 0; i < 3; ++i) {
+    variables[i] = s.PoseVariable(joint.a, i);
+    variables[3 + i] = s.PoseVariable(joint.b, i);
+  }
+  LocalJet numbers[7];
+  for (int i = 0; i < joint.num_geometry; ++i) {
+    variables[6 + i] = s.ParameterVariable(joint.geometry + i);
+    numbers[i] = LocalJet(model.parameters[joint.geometry + i], 6 + i);
+  }
+  int count = 6 + joint.num_geometry;
+  const auto pose = [&](int body, int first) {
+    const double* q = &at.pose[3 * body];
+    return Pose<LocalJet>(Vector2<LocalJet>(LocalJet(q[0], first), LocalJet(q[1], first + 1)),
+                          LocalJet(q[2], first + 2));
+  };
+  JointRows<LocalJet> rows;
+  EvaluateJoint(joint.type, pose(joint.a, 0), pose(joint.b, 3), numbers, &rows);
+  if (couples) {
+    const int number = s.joints[j].geometry + (k == 0 ? 1 : 0);
+    variables[count] = s.ParameterVariable(number);
+    const LocalJet local(model.parameters[number], count++);
+    const LocalJet of_coupling[2] = {local, local};
+    ScaleToShare(s.joints[j].type, k, of_coupling, &rows);
+  }
+  const int a = s.bodies[joint.a].block;
+  const int b = s.bodies[joint.b].block;
+  for (int v = 0; v < count; ++v) {
+    if ((v < 3 && a >= 0) || (v >= 3 && v < 6 && b >= 0)) {
+      continue;  // a moving body's pose is an unknown: in K
     }
-    const int count = 6 + joint.num_geometry;
-    const auto pose = [&](int body, int first) {
-      const double* q = &at.pose[3 * body];
-      return Pose<LocalJet>(Vector2<LocalJet>(LocalJet(q[0], first), LocalJet(q[1], first + 1)),
-                            LocalJet(q[2], first + 2));
-    };
-    JointRows<LocalJet> rows;
-    EvaluateJoint(joint.type, pose(joint.a, 0), pose(joint.b, 3), numbers, &rows);
-    const int a = s.bodies[joint.a].block;
-    const int b = s.bodies[joint.b].block;
-    for (int v = 0; v < count; ++v) {
-      if ((v < 3 && a >= 0) || (v >= 3 && v < 6 && b >= 0)) {
-        continue;  // a moving body's pose is an unknown: in K
-      }
-      for (int r = 0; r < rows.rows; ++r) {
-        const double mu = iterate_.multipliers[3 * j + r];
-        sink(3 * (nb + static_cast<int>(j)) + r, variables[v], rows.error[r].v[v]);
-        for (int i = 0; i < 3; ++i) {
-          if (a >= 0) {
-            sink(3 * a + i, variables[v], -mu * rows.row_a[r][i].v[v]);
-          }
-          if (b >= 0) {
-            sink(3 * b + i, variables[v], -mu * rows.row_b[r][i].v[v]);
-          }
+    for (int r = 0; r < rows.rows; ++r) {
+      const double mu = iterate_.multipliers[3 * static_cast<size_t>(j) + r];
+      sink(3 * (nb + j) + r, variables[v], rows.error[r].v[v]);
+      for (int i = 0; i < 3; ++i) {
+        if (a >= 0) {
+          sink(3 * a + i, variables[v], -mu * rows.row_a[r][i].v[v]);
+        }
+        if (b >= 0) {
+          sink(3 * b + i, variables[v], -mu * rows.row_b[r][i].v[v]);
         }
       }
     }

@@ -56,6 +56,8 @@ class JointProjection {
  private:
   template <typename Sink>
   void Visit(const Model<double>& model, const Sink& sink);
+  template <typename Sink>
+  void VisitShare(const Model<double>& model, int j, int k, const Sink& sink);
   void SolveRefined(const Model<double>& model, std::vector<double>* x, int columns);
 
   ProjectionIterate<double> iterate_;

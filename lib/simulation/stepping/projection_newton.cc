@@ -20,8 +20,7 @@ void EvaluateAll(const Model<T>& model, const State<T>& state, std::vector<Joint
   const std::vector<JointIndex>& joints = model.structure->joints;
   rows->resize(joints.size());
   for (size_t j = 0; j < joints.size(); ++j) {
-    EvaluateJoint(joints[j].type, state.PoseOf(joints[j].a), state.PoseOf(joints[j].b),
-                  &model.parameters[joints[j].geometry], &(*rows)[j]);
+    EvaluateJoint(model, state, joints[j], &(*rows)[j]);
   }
 }
 
@@ -70,7 +69,7 @@ void JointEdges(const ModelStructure& structure, std::vector<std::pair<int, int>
         edges->emplace_back(body, block);
       }
     }
-    if (CouplesBodies(joint.type) && a >= 0 && b >= 0) {
+    if (CouplesBodies(structure, joint)) {
       edges->emplace_back(a, b);
     }
     ++block;
@@ -174,7 +173,7 @@ bool FactorMatrix(const Model<T>& model, ProjectionWeight weight, ProjectionIter
     const JointIndex& joint = s.joints[j];
     add(joint.a, rows.row_a);
     add(joint.b, rows.row_b);
-    if (CouplesBodies(joint.type) && s.bodies[joint.a].block >= 0 && s.bodies[joint.b].block >= 0) {
+    if (CouplesBodies(s, joint)) {
       for (int i = 0; i < 9 && weight == ProjectionWeight::kExact; ++i) {
         lu.FirstSecond(edge)[i] -= p->curvature[j].ab[i];
         lu.SecondFirst(edge)[3 * (i % 3) + i / 3] -= p->curvature[j].ab[i];
@@ -190,9 +189,7 @@ void EvaluateCurvatures(const Model<T>& model, ProjectionIterate<T>* p) {
   const std::vector<JointIndex>& joints = model.structure->joints;
   p->curvature.resize(joints.size());
   for (size_t j = 0; j < joints.size(); ++j) {
-    EvaluateJointCurvature(joints[j].type, p->at.PoseOf(joints[j].a), p->at.PoseOf(joints[j].b),
-                           &model.parameters[joints[j].geometry], &p->multipliers[3 * j],
-                           &p->curvature[j]);
+    EvaluateJointCurvature(model, p->at, joints[j], &p->multipliers[3 * j], &p->curvature[j]);
   }
 }
 
@@ -254,6 +251,7 @@ template <typename T>
 void TryStep(const Model<T>& model, double fraction, ProjectionIterate<T>* p) {
   const ModelStructure& s = *model.structure;
   p->trial.pose = p->at.pose;
+  p->trial.released = p->at.released;
   for (int k = 0; k < s.num_blocks(); ++k) {
     for (int i = 0; i < 3; ++i) {
       p->trial.pose[3 * s.moving[k] + i] += fraction * p->rhs[3 * k + i];

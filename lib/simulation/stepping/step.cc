@@ -456,6 +456,8 @@ StepReport Stepper::Step(const Model<double>& model, double t, double h, State<d
   r.h = h;
   chosen_ = false;
   FollowPathsOverStep(model, t, h, state);
+  SetReleased(model, ReleasedAtStep(structure, t), state);
+  r.before.released.assign(state->released.begin(), state->released.end());
   r.before.pose.assign(state->pose.begin(), state->pose.end());
   r.before.twist.assign(state->twist.begin(), state->twist.end());
   AssembleWithoutContacts(model, *state, t, h, &r.problem, &scratch_);

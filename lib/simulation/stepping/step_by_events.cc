@@ -126,6 +126,7 @@ StepReport Stepper::StepByEvents(const Model<double>& model, double t, double h,
   last_contacts_ = r.contacts;
   last_solution_.modes = r.solution.modes;
   StepReport report = events_->Step(model, t, h, state);
+  SetReleased(model, ReleasedAtStep(*model.structure, t + h), state);
   const Rung rung = std::exchange(report.rung, Rung::kNone);
   report.gap_min = HUGE_VAL;
   const auto finite = [](const State<double>& x) {

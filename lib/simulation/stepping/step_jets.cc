@@ -72,6 +72,7 @@ bool StepInJets(const Model<T>& model, const Model<double>& values, JetRoute rou
     return true;
   }
   FollowPathsOverStep(model, stepper->record().time, stepper->record().h, state);
+  state->released = stepper->record().before.released;
   if (route == JetRoute::kUnrolled) {
     const State<T> before = *state;
     if (StepUnrolled(model, stepper->record(), state)) return true;

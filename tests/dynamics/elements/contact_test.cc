@@ -138,7 +138,7 @@ TEST(ContactTest, FrictionInAJointIsAContactWithoutANormal) {
   State<double> state;
   BuildModel(scene, &model, &state);
   std::vector<ActiveContact> contacts;
-  AppendJointFriction(model, &contacts);
+  AppendJointFriction(model, {}, &contacts);
   ASSERT_EQ(contacts.size(), 1u);
   EXPECT_TRUE(contacts[0].IsJointFriction());
   const CoefficientSource source = FrictionOf(model, contacts[0]);

@@ -10,9 +10,9 @@
 
 namespace tangible::testing {
 
-inline constexpr JointType kTypes[] = {JointType::kRevolute,   JointType::kPrismatic,
-                                       JointType::kWeld,       JointType::kDistance,
-                                       JointType::kFixedAngle, JointType::kCoupling};
+inline constexpr JointType kTypes[] = {JointType::kRevolute, JointType::kPrismatic,
+                                       JointType::kWeld, JointType::kDistance,
+                                       JointType::kFixedAngle};
 /// x, y and angle of the first and of the second body.
 inline constexpr double kPoses[6] = {0.3, -0.2, 0.7, -0.4, 0.5, -1.1};
 
@@ -23,9 +23,6 @@ inline std::vector<double> Geometry(JointType type) {
       return {0.11, -0.23, 0.31, 0.17, std::cos(0.6), std::sin(0.6), 0.4};
     case JointType::kFixedAngle:
       return {0.4};
-    case JointType::kCoupling:
-    case JointType::kLimitedCoupling:
-      return {0.11, -0.23, 0.31, 0.17, -0.6, 0.8, 0.4};
     default:
       return {0.11, -0.23, 0.31, 0.17, 0.4};
   }

@@ -45,8 +45,7 @@ TEST(JointTest, RowsAreTheDerivativesOfTheErrors) {
 }
 
 TEST(JointTest, CoordinateRowsAreTheDerivativesOfTheCoordinate) {
-  for (const JointType type :
-       {JointType::kRevolute, JointType::kPrismatic, JointType::kLimitedCoupling}) {
+  for (const JointType type : {JointType::kRevolute, JointType::kPrismatic, JointType::kRope}) {
     const JointRows<LocalJet> rows = Evaluate(type);
     for (int i = 0; i < 3; ++i) {
       EXPECT_NEAR(rows.coordinate_a[i].a, rows.coordinate.v[i], 1e-15);
@@ -56,8 +55,8 @@ TEST(JointTest, CoordinateRowsAreTheDerivativesOfTheCoordinate) {
 }
 
 TEST(JointTest, NumbersOfRows) {
-  const int expected[] = {2, 2, 3, 1, 1, 1};
-  for (int k = 0; k < 6; ++k) {
+  const int expected[] = {2, 2, 3, 1, 1};
+  for (int k = 0; k < 5; ++k) {
     EXPECT_EQ(Evaluate(kTypes[k]).rows, expected[k]);
   }
 }

@@ -34,10 +34,8 @@ TEST(JointRatesTest, AreTheChangeOfTheRowsSpeedsAtConstantTwists) {
   const struct {
     JointType type;
     int count;
-  } kinds[] = {{JointType::kRevolute, 5},       {JointType::kPrismatic, 7},
-               {JointType::kWeld, 5},           {JointType::kDistance, 5},
-               {JointType::kFixedAngle, 1},     {JointType::kCoupling, 7},
-               {JointType::kLimitedCoupling, 7}};
+  } kinds[] = {{JointType::kRevolute, 5}, {JointType::kPrismatic, 7},  {JointType::kWeld, 5},
+               {JointType::kDistance, 5}, {JointType::kFixedAngle, 1}, {JointType::kRope, 5}};
   for (const auto& kind : kinds) {
     JointRows<double> rows;
     JointRates<double> rates;

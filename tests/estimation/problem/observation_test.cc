@@ -61,9 +61,10 @@ TEST(ObservationTest, MistakesAreOneLineWithFileAndLine) {
       {"time,body\n0,ball\n",
        "o.csv: header: expected a column x, y, angle, vx, vy, omega, distance, ax, ay or alpha, "
        "got none of them"},
-      {"time,x\n0,1\n", "o.csv: header: expected a column body or a column point, got neither"},
+      {"time,x\n0,1\n",
+       "o.csv: header: expected one column body, point, joint or contact, got none"},
       {"time,body,point,x\n0,ball,tip,1\n",
-       "o.csv: header: expected a column body or a column point, got both"}};
+       "o.csv: header: expected one column body, point, joint or contact, got several"}};
   for (const auto& [text, message] : cases) {
     const Parsed parsed = Parse(text);
     EXPECT_FALSE(parsed.ok) << text;

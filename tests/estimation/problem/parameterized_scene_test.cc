@@ -217,5 +217,36 @@ TEST(ParameterizedSceneTest, MistakesSayWhichParameterAndKey) {
   EXPECT_EQ(Fault({reverse}).key, "upper");
 }
 
+// Gears that mesh, and a rope over a pulley whose ends start at their bodies' velocities.
+TEST(ParameterizedSceneTest, InitialRatesObeyAKeptCoupling) {
+  const Scene scene = MakeScene(R"({"bodies": [
+      {"name": "a", "mass": 1, "inertia": 1, "position": [0, 0]},
+      {"name": "b", "mass": 1, "inertia": 1, "position": [1, 0]},
+      {"name": "left", "mass": 1, "inertia": 1, "position": [3, 0], "velocity": [0, 2]},
+      {"name": "right", "mass": 1, "inertia": 1, "position": [4, 0], "velocity": [0, -2]}],
+    "joints": [
+      {"name": "p", "type": "revolute", "bodies": ["a", "world"], "anchor": [0, 0], "rate": 1},
+      {"name": "q", "type": "revolute", "bodies": ["b", "world"], "anchor": [1, 0], "rate": -0.5},
+      {"name": "mesh", "type": "coupling", "joints": ["p", "q"], "ratio": 2},
+      {"name": "l", "type": "distance", "bodies": ["left", "world"], "anchors": [[3, 0], [3, 5]],
+       "limits": [0, null]},
+      {"name": "r", "type": "distance", "bodies": ["world", "right"], "anchors": [[4, 5], [4, 0]],
+       "limits": [0, null]},
+      {"name": "rope", "type": "coupling", "joints": ["l", "r"], "ratio": 1}]})");
+  const auto fault_of = [&](const std::vector<FitParameter>& parameters) {
+    ParameterizedScene parameterized;
+    ParameterError error;
+    return parameterized.Create(scene, {}, parameters, &error) ? "" : error.what;
+  };
+  EXPECT_EQ(fault_of({Parameter("joints/p/rate", 1.0)}), "");
+  EXPECT_EQ(fault_of({Parameter("joints/p/rate", 1.5)}),
+            "the scene with the initial values: /joints/2: expected initial rates with rate(p) + "
+            "ratio * rate(q) = 0, got 0.5");
+  EXPECT_EQ(fault_of({Parameter("bodies/left/velocity/y", 2.0)}), "");
+  EXPECT_EQ(fault_of({Parameter("bodies/left/velocity/y", 2.25)}),
+            "the scene with the initial values: /joints/5: expected initial rates with rate(l) + "
+            "ratio * rate(r) = 0, got -0.25");
+}
+
 }  // namespace
 }  // namespace tangible

@@ -191,7 +191,7 @@ RolloutResiduals RecordedChain(Stepping stepping) {
     observation.body = i % 4;
     observation.point = observation.body == 2 ? 0 : -1;
     observation.channel = (i / 4) % 6;
-    observation.coordinate = static_cast<Coordinate>((i / 3) % kCoordinates);
+    observation.coordinate = static_cast<Coordinate>((i / 3) % kBodyCoordinates);
     // The distance of the ball to itself, and from nothing, is no observation.
     if (observation.coordinate == Coordinate::kDistance &&
         (channels[observation.channel].to_body < 0 || observation.body == 3)) {

@@ -61,8 +61,10 @@ TEST_F(AccelerationFitJsonTest, MistakesAreOneLine) {
             "/observations/0/gravity: expected a file with ax, ay or alpha, got seen.csv");
   EXPECT_EQ(Read(R"(, "relative_to": "bob")", &fit),
             "line 2: ax: expected no camera and no relative_to of an acceleration, got one");
-  EXPECT_EQ(Read("", &fit, "phone", R"(, "segments": 2)"),
-            "/segments: expected 1 where times of events or accelerations are observed, got 2");
+  EXPECT_EQ(
+      Read("", &fit, "phone", R"(, "segments": 2)"),
+      "/segments: expected 1 where times of events, accelerations or forces are observed, got "
+      "2");
 }
 
 }  // namespace

@@ -87,7 +87,8 @@ TEST_F(EventFitJsonTest, MistakesAreOneLine) {
   EXPECT_NE(Read(R"({"bounce": {"bodies": ["ball", "floor"]}})").find("/events/bounce"),
             std::string::npos);
   EXPECT_EQ(Read(kBounce, R"(, "segments": 2)"),
-            "/segments: expected 1 where times of events or accelerations are observed, got 2");
+            "/segments: expected 1 where times of events, accelerations or forces are observed, "
+            "got 2");
   EXPECT_EQ(Read(kBounce, "", R"({"x": 1})"),
             "/observations/0/sigma: expected a sigma of bounce, which heard.csv has");
   EXPECT_EQ(Read(kBounce, "", "0.01", "fixed"),

@@ -4,6 +4,7 @@
 // method.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <vector>
@@ -106,6 +107,119 @@ TEST(CouplingsTest, APulleyCarriesTwoWeights) {
   const CoupledMotion speed = {
       -5.0, {"bodies/left/mass", "bodies/right/mass", "gravity/y"}, {-1.25, 3.75, 0.5}};
   ExpectMotion(pulley, "fixed", 0.01, 4, speed);
+}
+
+// Atwood's machine: two weights hang on one rope over a fixed pulley, whose ends are distance
+// joints of any length:  ÿ_1 = −g (m_1 − m_2) / (m_1 + m_2).
+std::string Atwood(const std::string& velocity, const std::string& limits) {
+  return R"({"gravity": [0, -10], "bodies": [
+      {"name": "left", "mass": 3, "inertia": 0.1, "position": [0, 0], "velocity": [0, )" +
+         velocity + R"(]},
+      {"name": "right", "mass": 1, "inertia": 0.1, "position": [1, 0.5]}],
+    "joints": [
+      {"name": "rope", "type": "coupling", "joints": ["l", "r"], "ratio": 1)" +
+         limits + R"(},
+      {"name": "l", "type": "distance", "bodies": ["left", "world"], "anchors": [[0, 0], [0, 9]],
+       "limits": [0, null]},
+      {"name": "r", "type": "distance", "bodies": ["world", "right"], "anchors": [[1, 8], [1, 0.5]],
+       "limits": [0, null]}])";
+}
+
+TEST(CouplingsTest, AtwoodsMachineFallsAsInTheClosedForm) {
+  const CoupledMotion place = {
+      -2.5, {"bodies/left/mass", "bodies/right/mass", "gravity/y"}, {-0.625, 1.875, 0.25}};
+  ExpectMotion(Atwood("0", ""), "event", 0.05, 1, place);
+  const CoupledMotion speed = {
+      -5.0, {"bodies/left/mass", "bodies/right/mass", "gravity/y"}, {-1.25, 3.75, 0.5}};
+  ExpectMotion(Atwood("0", ""), "fixed", 0.01, 4, speed);
+  // Pulled by the whole weight from its start, a rope that may go slack stays taut.
+  ExpectMotion(Atwood("0", R"(, "limits": [null, 0])"), "event", 0.05, 1, place);
+}
+
+// The heavy weight is thrown up at v and the rope goes slack. It is taut again where
+// v t − g t² = −d, at t*; then an impulse J makes its ends move alike, and the weights go on as
+// above:
+//   y(T) = v t* − ½ g t*² + u τ + ½ a τ²,  τ = T − t*,  u = v − g t* + J / m_1.
+TEST(CouplingsTest, ASlackRopeBecomesTaut) {
+  const double g = 10.0, v = 4.0, d = 0.2, m1 = 3.0, m2 = 1.0;
+  const auto place = [](const double x[5]) {
+    const double left = x[0], right = x[1], speed = x[2], slack = x[3], weight = -x[4];
+    const double taut = (speed + std::sqrt(speed * speed + 4.0 * weight * slack)) / (2.0 * weight);
+    const double impulse = -(speed - 2.0 * weight * taut) / (1.0 / left + 1.0 / right);
+    const double after = speed - weight * taut + impulse / left;
+    const double rest = 1.0 - taut;
+    return speed * taut - 0.5 * weight * taut * taut + after * rest -
+           0.5 * weight * (left - right) / (left + right) * rest * rest;
+  };
+  const double at[5] = {m1, m2, v, d, -g};
+  CoupledMotion exact = {place(at),
+                         {"bodies/left/mass", "bodies/right/mass", "bodies/left/velocity/y",
+                          "joints/rope/limits/1", "gravity/y"},
+                         {}};
+  for (int k = 0; k < 5; ++k) {
+    double up[5], down[5];
+    std::copy_n(at, 5, up);
+    std::copy_n(at, 5, down);
+    up[k] += 1e-5;
+    down[k] -= 1e-5;
+    exact.derivatives.push_back((place(up) - place(down)) / 2e-5);
+  }
+  ExpectMotion(Atwood("4", R"(, "limits": [null, 0.2])"), "event", 0.05, 1, exact);
+}
+
+// A ring on a string between two pins moves on an ellipse, at a constant speed where no other force
+// acts.
+TEST(CouplingsTest, ARingOnAStringMovesOnAnEllipse) {
+  const std::string string = R"({"gravity": [0, 0], "bodies": [
+      {"name": "ring", "mass": 2, "inertia": 0.1, "position": [0, 0.8], "velocity": [1.5, 0]}],
+    "joints": [
+      {"name": "p", "type": "distance", "bodies": ["ring", "world"],
+       "anchors": [[0, 0.8], [-0.6, 0]], "limits": [0, null]},
+      {"name": "q", "type": "distance", "bodies": ["world", "ring"],
+       "anchors": [[0.6, 0], [0, 0.8]], "limits": [0, null]},
+      {"name": "string", "type": "coupling", "joints": ["p", "q"], "ratio": 1}],
+    "simulation": {"duration": 2, "stepping": "event", "dt": 0.005}})";
+  const std::vector<std::string> paths = {"bodies/ring/velocity/x", "bodies/ring/mass",
+                                          "bodies/ring/position/y", "joints/p/anchors/1/x"};
+  const GradientResult result = testing::Jacobian(SceneOf(string), paths, GradientMethod::kAdjoint);
+  const VectorX<double>& end = result.values;
+  EXPECT_NEAR(std::hypot(end[0] + 0.6, end[1]) + std::hypot(end[0] - 0.6, end[1]), 2.0, 1e-10);
+  EXPECT_NEAR(std::hypot(end[3], end[4]), 1.5, 1e-7);
+  EXPECT_LT(end[1], 0.7);  // it has gone some way
+  EXPECT_EQ(result.certificate.verdict, "trustworthy");
+  testing::ExpectOthersAgree(SceneOf(string), paths, result);
+}
+
+// An arm that turns drives a slider along itself, θ + r x = 0: with ρ its distance,
+//   (I + m ρ² + m / r²) ω² is kept,  and the place of the slider is ρ (cos θ, sin θ).
+TEST(CouplingsTest, AnArmDrivesASliderOnItself) {
+  const std::string arm = R"({"gravity": [0, 0], "bodies": [
+      {"name": "arm", "mass": 2, "inertia": 0.5, "position": [0, 0]},
+      {"name": "slider", "mass": 3, "inertia": 0.2, "position": [1, 0]}],
+    "joints": [
+      {"name": "hinge", "type": "revolute", "bodies": ["arm", "world"], "anchor": [0, 0],
+       "rate": 1.2},
+      {"name": "rail", "type": "prismatic", "bodies": ["slider", "arm"], "anchor": [1, 0],
+       "axis": [1, 0], "rate": 0.3},
+      {"name": "screw", "type": "coupling", "joints": ["hinge", "rail"], "ratio": -4}])";
+  for (const char* stepping : {"event", "fixed"}) {
+    const Scene scene = SceneOf(arm + R"(, "simulation": {"duration": 1, "stepping": ")" +
+                                stepping + R"(", "dt": 0.01}})");
+    const std::vector<std::string> paths = {"joints/screw/ratio", "bodies/slider/mass",
+                                            "bodies/arm/inertia", "joints/rail/rate"};
+    const GradientResult result = testing::Jacobian(scene, paths, GradientMethod::kAdjoint);
+    const double theta = result.values[2], omega = result.values[5];
+    const double distance = std::hypot(result.values[6], result.values[7]);
+    if (stepping == std::string("event")) {
+      EXPECT_NEAR(distance, 1.0 + theta / 4.0, 1e-10);
+      EXPECT_NEAR((0.7 + 3.0 * (distance * distance + 1.0 / 16.0)) * omega * omega,
+                  (0.7 + 3.0 * (1.0 + 1.0 / 16.0)) * 1.2 * 1.2, 1e-7);
+    } else {
+      EXPECT_NEAR(distance, 1.0 + theta / 4.0, 0.02);  // first order in dt
+    }
+    EXPECT_GT(theta, 1.0);
+    testing::ExpectOthersAgree(scene, paths, result);
+  }
 }
 
 // Play between two gears: the first turns freely by H, strikes, and the rate of the coupling is
