@@ -196,8 +196,11 @@ class StateProblem : public LeastSquaresProblem {
       JointRows<double> equations;
       EvaluateJoint(model_, state, joint, &equations);
       for (int k = 0; k < equations.rows; ++k) {
-        const double rate =
+        double rate =
             RelativeSpeed(state, joint.a, equations.row_a[k], joint.b, equations.row_b[k]);
+        if (joint.c >= 0) {
+          rate += RelativeSpeed(state, joint.c, equations.row_c, joint.d, equations.row_d);
+        }
         (*rows)[*row + 2 * k] = weight_ / smallest_ * equations.error[k];
         (*rows)[*row + 2 * k + 1] = weight_ / smallest_ * rate;
       }

@@ -51,6 +51,14 @@ void JointState::ProjectTwists(State<double>* state) const {
           if (block >= 0) rows(at, 3 * block + i) += row[i] / roots[3 * block + i];
         }
       }
+      if (joint.c < 0) continue;
+      for (const auto& [body, row] : {std::pair(joint.c, of.row_c), {joint.d, of.row_d}}) {
+        const int block = s.bodies[body].block;
+        for (int i = 0; i < 3; ++i) {
+          rates[at] += row[i] * state->twist[3 * body + i];
+          if (block >= 0) rows(at, 3 * block + i) += row[i] / roots[3 * block + i];
+        }
+      }
     }
   }
   const VectorX<double> change = rows.completeOrthogonalDecomposition().solve(-rates);

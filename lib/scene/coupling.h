@@ -17,7 +17,7 @@
 namespace tangible {
 
 struct CouplingEnds {
-  int bodies[2] = {-1, -1};  ///< not static ones, in the order of the joints; −1: only one
+  int bodies[4] = {-1, -1, -1, -1};  ///< not static ones, in the order of the joints; −1: fewer
   /// Why the joints cannot be coupled, as a sentence that begins with "expected"; "" where they
   /// can.
   std::string fault;
@@ -43,14 +43,14 @@ CouplingEnds EndsOf(const BasicScene<T>& scene, const BasicJoint<T>& coupling) {
       if (body < 0 || scene.bodies[body].motion == Motion::kStatic) continue;
       int at = 0;
       while (at < found && ends.bodies[at] != body) ++at;
-      if (at == 2) {
-        ends.fault =
-            "expected joints that hold at most two moving bodies in all, got three or four";
-        return ends;
-      }
       ends.bodies[at] = body;
       found = at == found ? found + 1 : found;
     }
+  }
+  if (found > 2 && coupling.limits) {
+    ends.fault =
+        "expected joints of at most two moving bodies in all under a coupling with limits, got " +
+        std::to_string(found);
   }
   return ends;
 }

@@ -260,12 +260,6 @@ TEST(BadSceneTest, Couplings) {
        "/joints/0/joints: expected an array of 2 names of joints, got an array of 1"},
       {"/joints/0/joints", kRemove,
        "/joints/0/joints: missing, expected an array of 2 names of joints"},
-      {"/joints/0/joints", "[\"p\", \"r\"]",
-       "/joints/0/joints: expected joints that hold at most two moving bodies in all, got three or "
-       "four"},
-      {"/joints/0/joints", "[\"p\", \"s\"]",
-       "/joints/0/joints: expected joints that hold at most two moving bodies in all, got three or "
-       "four"},
       {"/joints/2/rate", "0.5",
        "/joints/0: expected initial rates with rate(p) + ratio * rate(q) = 0, got 2.0"},
       {"/joints/0/ratio", kRemove, "/joints/0/ratio: missing, expected a number"},
@@ -273,6 +267,17 @@ TEST(BadSceneTest, Couplings) {
        "/joints/0/bodies: unknown key of a coupling joint, expected one of name, type, joints, "
        "contact, until, ratio, limits, limit_restitution, got \"bodies\""}};
   for (const BadScene& c : cases) EXPECT_EQ(ErrorIn(kGears, c), "bad.json: " + c.message);
+  // A kept coupling may be of up to four bodies, one with limits of two.
+  Json wide = Json::parse(kGears);
+  wide["joints"][0]["joints"] = {"p", "r"};
+  wide["joints"][1]["rate"] = 0.0;
+  EXPECT_TRUE(ParseScene(wide.dump(), "wide.json", ::testing::TempDir(), &scene, &error)) << error;
+  wide["joints"][0]["limits"] = {-0.1, 0.1};
+  EXPECT_FALSE(ParseScene(wide.dump(), "wide.json", ::testing::TempDir(), &scene, &error));
+  EXPECT_EQ(
+      error,
+      "wide.json: /joints/0/joints: expected joints of at most two moving bodies in all under "
+      "a coupling with limits, got 3");
   // Play leaves the rates free.
   Json play = Json::parse(kGears);
   play["joints"][2]["rate"] = 3.0;

@@ -210,6 +210,7 @@ class ProblemBuilder {
             PrescribedShare(s_, scratch_.given, joint.a, rows.row_a[k], joint.b, rows.row_b[k]);
       }
     }
+    if (joint.c >= 0 && rows.rows > 0) Widen(joint, rows, &block);
   }
 
   // Every support has a block, so that those of others stay where they are as it holds or slides.
@@ -264,6 +265,24 @@ class ProblemBuilder {
   }
 
  private:
+  // The row of a coupling on its third and fourth body.
+  void Widen(const JointIndex& joint, const JointRows<T>& rows, JointBlock<T>* block) const {
+    block->c = s_.bodies[joint.c].block;
+    block->d = s_.bodies[joint.d].block;
+    block->row_c = rows.row_c;
+    block->row_d = rows.row_d;
+    if (block->c < 0) {
+      std::swap(block->c, block->d);
+      std::swap(block->row_c, block->row_d);
+    }
+    if constexpr (kLevel == Level::kVelocity) {
+      block->rhs[0] -= PrescribedSpeed(s_, state_, joint.c, rows.row_c, joint.d, rows.row_d);
+    } else if (IsDriven()) {
+      block->rhs[0] -=
+          PrescribedShare(s_, scratch_.given, joint.c, rows.row_c, joint.d, rows.row_d);
+    }
+  }
+
   // Whether some bodies have accelerations of their own.
   bool IsDriven() const { return kLevel == Level::kAcceleration && !s_.paths.empty(); }
 

@@ -292,7 +292,12 @@ bool ContactSearch::GiveUpRebounds(const Model<double>& model, double h, int con
   const auto join = [&](int a, int b) {
     if (structure.bodies[a].block >= 0 && structure.bodies[b].block >= 0) bodies.Join(a, b);
   };
-  for (const JointIndex& joint : structure.joints) join(joint.a, joint.b);
+  for (const JointIndex& joint : structure.joints) {
+    join(joint.a, joint.b);
+    if (joint.c < 0) continue;
+    join(joint.a, joint.c);
+    join(joint.a, joint.d);
+  }
   for (const ActiveContact& c : *contacts) join(c.a, c.b);
   const auto set_of = [&](const ActiveContact& c) {
     return bodies.Root(structure.bodies[c.a].block >= 0 ? c.a : c.b);

@@ -30,6 +30,7 @@ struct JointRows {
   T error[3];
   RowPart<T> coordinate_a, coordinate_b;  ///< where HasCoordinate
   T coordinate;                           ///< rad or m, 0 as drawn
+  RowPart<T> row_c, row_d;                ///< of a coupling of more than two bodies
 };
 
 /// Whether a joint has a coordinate, along which limits act.

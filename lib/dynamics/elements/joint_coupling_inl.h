@@ -35,13 +35,18 @@ template <typename T>
 void AddShare(const JointIndex& coupling, const JointIndex& of, int k, const JointRows<T>& share,
               JointRows<T>* out) {
   if (k == 0) {
-    out->coordinate_a = out->coordinate_b = {T(0.0), T(0.0), T(0.0)};
+    for (RowPart<T>* row : {&out->coordinate_a, &out->coordinate_b, &out->row_c, &out->row_d}) {
+      *row = {T(0.0), T(0.0), T(0.0)};
+    }
     out->coordinate = T(0.0);
   }
   const auto add = [&](int body, const RowPart<T>& part) {
-    if (body != coupling.a && body != coupling.b) return;
-    RowPart<T>& row = body == coupling.a ? out->coordinate_a : out->coordinate_b;
-    for (int i = 0; i < 3; ++i) row[i] += part[i];
+    RowPart<T>* const row = body == coupling.a   ? &out->coordinate_a
+                            : body == coupling.b ? &out->coordinate_b
+                            : body == coupling.c ? &out->row_c
+                            : body == coupling.d ? &out->row_d
+                                                 : nullptr;
+    for (int i = 0; i < 3 && row != nullptr; ++i) (*row)[i] += part[i];
   };
   add(of.a, share.coordinate_a);
   add(of.b, share.coordinate_b);

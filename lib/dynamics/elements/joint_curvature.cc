@@ -83,54 +83,28 @@ void EvaluateCoordinateCurvature(JointType type, const Pose<T>& pose_a, const Po
   }
 }
 
-// Adds the curvature of a coordinate, on its own bodies, to that of the coupling.
-template <typename T>
-void AddCurvature(const JointIndex& coupling, const JointIndex& of, const JointCurvature<T>& share,
-                  JointCurvature<T>* out) {
-  const auto diagonal = [&](int body, const T* block) {
-    T* const to = body == coupling.a ? out->aa : body == coupling.b ? out->bb : nullptr;
-    for (int i = 0; i < 9 && to != nullptr; ++i) to[i] += block[i];
-  };
-  diagonal(of.a, share.aa);
-  diagonal(of.b, share.bb);
-  for (int i = 0; i < 9; ++i) {
-    if (of.a == coupling.a && of.b == coupling.b) out->ab[i] += share.ab[i];
-    if (of.a == coupling.b && of.b == coupling.a) out->ab[i] += share.ab[3 * (i % 3) + i / 3];
-  }
-}
-
 }  // namespace
 
-bool CouplesBodies(const ModelStructure& structure, const JointIndex& joint) {
-  if (structure.bodies[joint.a].block < 0 || structure.bodies[joint.b].block < 0) return false;
-  if (joint.type != JointType::kCoupling) {
-    return joint.type == JointType::kPrismatic || joint.type == JointType::kDistance;
-  }
-  return std::any_of(joint.coupled, joint.coupled + 2, [&](int coupled) {
-    const JointIndex& of = structure.joints[coupled];
-    return of.type != JointType::kRevolute && structure.bodies[of.a].block >= 0 &&
-           structure.bodies[of.b].block >= 0;
-  });
+bool CouplesBodies(const ModelStructure& structure, const JointIndex& joint, int k) {
+  const JointIndex& of = ShareOf(structure, joint, k);
+  if (structure.bodies[of.a].block < 0 || structure.bodies[of.b].block < 0) return false;
+  if (joint.type == JointType::kLimitedCoupling || joint.type == JointType::kRope) return false;
+  return of.type == JointType::kPrismatic || of.type == JointType::kDistance ||
+         of.type == JointType::kRope;
 }
 
 template <typename T>
 void EvaluateJointCurvature(const Model<T>& model, const State<T>& state, const JointIndex& joint,
-                            const T* multipliers, JointCurvature<T>* out) {
-  if (joint.type != JointType::kCoupling) {
-    EvaluateJointCurvature(joint.type, state.PoseOf(joint.a), state.PoseOf(joint.b),
-                           &model.parameters[joint.geometry], multipliers, out);
+                            int k, const T* multipliers, JointCurvature<T>* out) {
+  const JointIndex& of = ShareOf(*model.structure, joint, k);
+  if (!joint.IsCoupling()) {
+    EvaluateJointCurvature(of.type, state.PoseOf(of.a), state.PoseOf(of.b),
+                           &model.parameters[of.geometry], multipliers, out);
     return;
   }
-  SetZero(out);
-  for (int k = 0; k < 2; ++k) {
-    const JointIndex& of = model.structure->joints[joint.coupled[k]];
-    const T multiplier =
-        k == 0 ? multipliers[0] : model.parameters[joint.geometry] * multipliers[0];
-    JointCurvature<T> share;
-    EvaluateCoordinateCurvature(of.type, state.PoseOf(of.a), state.PoseOf(of.b),
-                                &model.parameters[of.geometry], multiplier, &share);
-    AddCurvature(joint, of, share, out);
-  }
+  const T multiplier = k == 0 ? multipliers[0] : model.parameters[joint.geometry] * multipliers[0];
+  EvaluateCoordinateCurvature(of.type, state.PoseOf(of.a), state.PoseOf(of.b),
+                              &model.parameters[of.geometry], multiplier, out);
 }
 
 template <typename T>
@@ -172,7 +146,7 @@ void EvaluateJointCurvature(JointType type, const Pose<T>& pose_a, const Pose<T>
 
 #define TANGIBLE_INSTANTIATE(T)                                                                \
   template void EvaluateJointCurvature<T>(const Model<T>&, const State<T>&, const JointIndex&, \
-                                          const T*, JointCurvature<T>*);                       \
+                                          int, const T*, JointCurvature<T>*);                  \
   template void EvaluateJointCurvature<T>(JointType, const Pose<T>&, const Pose<T>&, const T*, \
                                           const T*, JointCurvature<T>*);
 #define TANGIBLE_INSTANTIATE_JET(N) TANGIBLE_INSTANTIATE(Jet<N>)

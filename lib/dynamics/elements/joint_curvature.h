@@ -28,13 +28,21 @@ struct JointCurvature {
   T aa[9], ab[9], bb[9];
 };
 
-/// Whether both bodies move and `ab` may differ from 0.
-bool CouplesBodies(const ModelStructure& structure, const JointIndex& joint);
+/// How many shares a joint has in its rows: a coupling one of each coordinate.
+inline int NumShares(const JointIndex& joint) { return joint.IsCoupling() ? 2 : 1; }
 
-/// Of any joint of a model, at a state.
+/// The joint on whose bodies share k is: the joint itself, or the one that is coupled.
+inline const JointIndex& ShareOf(const ModelStructure& structure, const JointIndex& joint, int k) {
+  return joint.IsCoupling() ? structure.joints[joint.coupled[k]] : joint;
+}
+
+/// Whether both bodies of a share move and its `ab` may differ from 0.
+bool CouplesBodies(const ModelStructure& structure, const JointIndex& joint, int k);
+
+/// Of share k of any joint of a model, at a state.
 template <typename T>
 void EvaluateJointCurvature(const Model<T>& model, const State<T>& state, const JointIndex& joint,
-                            const T* multipliers, JointCurvature<T>* out);
+                            int k, const T* multipliers, JointCurvature<T>* out);
 
 /// The same of a joint other than a coupling. `multipliers`: one for each row of the joint. For a
 /// distance joint whose anchors coincide the term with t is 0.

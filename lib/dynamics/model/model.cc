@@ -192,14 +192,16 @@ void AddJoints(const BasicScene<T>& scene, Places* places, ModelStructure* struc
     index.name = joint.name;
     index.type = ModelType(joint);
     index.is_angular = joint.type == JointType::kRevolute;
-    int ends[2] = {joint.bodies[0], joint.bodies[1]};
+    int ends[4] = {joint.bodies[0], joint.bodies[1], -1, -1};
     if (joint.type == JointType::kCoupling) {
-      std::copy_n(EndsOf(scene, joint).bodies, 2, ends);
+      std::copy_n(EndsOf(scene, joint).bodies, 4, ends);
       std::copy_n(joint.coupled, 2, index.coupled);
       index.is_angular = scene.joints[joint.coupled[0]].type == JointType::kRevolute;
     }
     index.a = ends[0] < 0 ? world : ends[0];
     index.b = ends[1] < 0 ? world : ends[1];
+    index.c = ends[2];
+    index.d = ends[2] >= 0 && ends[3] < 0 ? world : ends[3];
     index.rows = NumRows(index.type);
     index.num_geometry = NumGeometryNumbers(index.type);
     index.geometry = places->Take(index.num_geometry);

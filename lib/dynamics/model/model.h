@@ -75,6 +75,7 @@ struct JointIndex {
   JointType type = JointType::kRevolute;
   int a = -1, b = -1;         ///< bodies; the world has an index too
   int coupled[2] = {-1, -1};  ///< of a coupling: two joints
+  int c = -1, d = -1;         ///< of a coupling that is kept: the third and fourth of its bodies
   int rows = 0;
   int geometry = -1;
   int num_geometry = 0;

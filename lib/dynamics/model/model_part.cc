@@ -108,6 +108,8 @@ class PartTaker {
       part_.joints.push_back(static_cast<int>(j));
       index.a = local_[index.a];
       index.b = local_[index.b];
+      if (index.c >= 0) index.c = local_[index.c];
+      if (index.d >= 0) index.d = local_[index.d];
       TakeNumbers(index.num_geometry, &index.geometry);
       TakeOne(&index.damping);
       TakeOne(&index.effort);

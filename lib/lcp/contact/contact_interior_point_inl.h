@@ -63,6 +63,9 @@ class InteriorPointSystem {
     };
     for (const JointBlock<T>& joint : p_.joints) {
       add(joint.a, joint.b);
+      if (joint.c < 0) continue;
+      --block;
+      add(joint.c, joint.d);
     }
     for (const ContactBlock<T>& contact : p_.contacts) {
       add(contact.a, contact.b);
@@ -104,8 +107,7 @@ class InteriorPointSystem {
         } else if (p_.redundant_joints) {
           // Where joints form loops their rows may be dependent. A proximal term keeps K regular
           // and does not change the solution, as it acts on the change of y only.
-          diagonal[4 * r] =
-              T(kProximal * RowMobility(p_.mass, joint.a, joint.row_a[r], joint.b, joint.row_b[r]));
+          diagonal[4 * r] = T(kProximal * JointMobility(p_.mass, joint, r));
         }
       }
       const auto add = [&](const RowPart<T>* rows) {
@@ -122,6 +124,12 @@ class InteriorPointSystem {
       }
       if (joint.b >= 0) {
         add(joint.row_b);
+      }
+      if (joint.c >= 0) {
+        add(&joint.row_c);
+      }
+      if (joint.d >= 0) {
+        add(&joint.row_d);
       }
     }
     for (int i = 0; i < nc_; ++i) {
@@ -197,8 +205,8 @@ class InteriorPointSystem {
       const JointBlock<T>& joint = p_.joints[j];
       const int at = 3 * (nb_ + j);
       for (int k = 0; k < joint.rows; ++k) {
-        AddRowTransposed(joint.a, joint.row_a[k], joint.b, joint.row_b[k], x[at + k], r);
-        r[at + k] -= RowDot(joint.a, joint.row_a[k], joint.b, joint.row_b[k], x);
+        AddJointRowTransposed(joint, k, x[at + k], r);
+        r[at + k] -= JointRowDot(joint, k, x);
       }
     }
     for (int i = 0; i < nc_; ++i) {

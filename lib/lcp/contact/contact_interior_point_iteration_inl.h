@@ -220,9 +220,8 @@ class ContactIteration : private InteriorPointSystem<T> {
     for (int j = 0; j < nj_; ++j) {
       const JointBlock<T>& joint = p_.joints[j];
       for (int k = 0; k < joint.rows; ++k) {
-        AddRowTransposed(joint.a, joint.row_a[k], joint.b, joint.row_b[k], w_.y[3 * j + k], r);
-        r[3 * (nb_ + j) + k] =
-            joint.rhs[k] - RowDot(joint.a, joint.row_a[k], joint.b, joint.row_b[k], v);
+        AddJointRowTransposed(joint, k, w_.y[3 * j + k], r);
+        r[3 * (nb_ + j) + k] = joint.rhs[k] - JointRowDot(joint, k, v);
       }
     }
     for (int i = 0; i < nc_; ++i) {

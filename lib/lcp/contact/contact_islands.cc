@@ -29,6 +29,11 @@ int IslandSolver::Partition(const ContactProblem<double>& problem) {
   join(problem.dampers);
   join(problem.joints);
   join(problem.contacts);
+  for (const JointBlock<double>& joint : problem.joints) {
+    for (const int body : {joint.c, joint.d}) {
+      if (body >= 0) bodies_.Join(std::max(joint.a, joint.b), body);
+    }
+  }
   has_contact_.assign(n, 0);
   count_ = 0;
   for (const ContactBlock<double>& contact : problem.contacts) {
@@ -122,7 +127,9 @@ void IslandSolver::Gather(const ContactProblem<double>& problem,
     own.dampers.push_back(moved(problem.dampers[i]));
   }
   for (const int j : island.joints) {
-    own.joints.push_back(moved(problem.joints[j]));
+    JointBlock<double>& joint = own.joints.emplace_back(moved(problem.joints[j]));
+    joint.c = joint.c < 0 ? -1 : place_[joint.c];
+    joint.d = joint.d < 0 ? -1 : place_[joint.d];
     append(guess.joint_impulse, j, &start.joint_impulse);
   }
   for (const int i : island.contacts) {

@@ -75,6 +75,7 @@ MixedLcp<double> DenseProblem(const ContactProblem<double>& problem) {
   for (const JointBlock<double>& joint : problem.joints) {
     for (int r = 0; r < joint.rows; ++r, ++row) {
       SetRow(joint.a, joint.row_a[r], joint.b, joint.row_b[r], 1.0, &dense.A, row);
+      if (joint.c >= 0) SetRow(joint.c, joint.row_c, joint.d, joint.row_d, 1.0, &dense.A, row);
       dense.b(row) = joint.rhs[r];
     }
   }

@@ -35,6 +35,7 @@ std::vector<ActiveRow> ListActiveRows(const ContactProblem<double>& problem,
     return rows.emplace_back(ActiveRow{index, a, b, row_a, row_b, row_a, row_b, scale});
   };
   int block = problem.num_bodies;
+  // A row on more than two bodies counts with those of its first joint.
   for (const JointBlock<double>& joint : problem.joints) {
     for (int k = 0; k < joint.rows; ++k) {
       add(3 * block + k, joint.a, joint.b, joint.row_a[k], joint.row_b[k]);

@@ -10,10 +10,10 @@
 //   w = t v + c_t,   |λt| ≤ μ λn                        Coulomb
 //   w > 0 ⇒ λt = −μ λn,   w < 0 ⇒ λt = μ λn
 //
-// Each row touches at most two blocks. Units: v m/s and rad/s, p and impulses N s and N m s, M kg
-// and kg m². Problems of the same form give accelerations (v m/s² and rad/s², p and λ N and N m)
-// and corrections of poses (v m and rad, p and λ kg m and kg m²): hence `motion` for v and `load`
-// for p.
+// Each row touches at most two blocks, the row of a coupling up to four. Units: v m/s and rad/s,
+// p and impulses N s and N m s, M kg and kg m². Problems of the same form give accelerations (v
+// m/s² and rad/s², p and λ N and N m) and corrections of poses (v m and rad, p and λ kg m and kg
+// m²): hence `motion` for v and `load` for p.
 //
 // As a complementarity problem each contact with friction has three rows (the planar form of
 // Pfeiffer and Glocker, Multibody Dynamics with Unilateral Contacts, 1996, ch. 6). The sliding
@@ -72,6 +72,9 @@ struct JointBlock {
   int rows = 0;  ///< 1 to 3
   RowPart<T> row_a[3], row_b[3];
   T rhs[3];  ///< b, less what bodies of prescribed motion contribute
+  /// Of a coupling, whose only row touches up to two more blocks; c < 0: it does not.
+  int c = -1, d = -1;
+  RowPart<T> row_c, row_d;
 };
 
 template <typename T>
@@ -185,6 +188,19 @@ void AddRowTransposed(int a, const RowPart<T>& row_a, int b, const RowPart<T>& r
   }
 }
 
+/// The same of row k of a joint.
+template <typename T, typename V>
+T JointRowDot(const JointBlock<T>& joint, int k, const V* v) {
+  T sum = RowDot(joint.a, joint.row_a[k], joint.b, joint.row_b[k], v);
+  if (joint.c >= 0) sum += RowDot(joint.c, joint.row_c, joint.d, joint.row_d, v);
+  return sum;
+}
+template <typename T, typename F, typename X>
+void AddJointRowTransposed(const JointBlock<T>& joint, int k, const F& factor, X* x) {
+  AddRowTransposed(joint.a, joint.row_a[k], joint.b, joint.row_b[k], factor, x);
+  if (joint.c >= 0) AddRowTransposed(joint.c, joint.row_c, joint.d, joint.row_d, factor, x);
+}
+
 /// visit(body, row, impulse) for every row of joints and contacts and each of its two bodies (−1:
 /// not a moving one); tangent rows of contacts without friction too.
 template <typename Visit>
@@ -195,6 +211,10 @@ void ForEachImpulse(const ContactProblem<double>& problem, const ContactSolution
     for (int k = 0; k < joint.rows; ++k) {
       visit(joint.a, joint.row_a[k], solution.joint_impulse[3 * j + k]);
       visit(joint.b, joint.row_b[k], solution.joint_impulse[3 * j + k]);
+    }
+    if (joint.c >= 0) {
+      visit(joint.c, joint.row_c, solution.joint_impulse[3 * j]);
+      visit(joint.d, joint.row_d, solution.joint_impulse[3 * j]);
     }
   }
   for (size_t i = 0; i < problem.contacts.size(); ++i) {

@@ -74,6 +74,8 @@ double MomentumResidual(const ContactProblem<double>& problem, const ContactScal
     const JointBlock<double>& joint = problem.joints[j];
     for (int k = 0; k < joint.rows; ++k) {
       add(joint.a, joint.row_a[k], joint.b, joint.row_b[k], solution.joint_impulse[3 * j + k]);
+      if (joint.c < 0) continue;
+      add(joint.c, joint.row_c, joint.d, joint.row_d, solution.joint_impulse[3 * j + k]);
     }
   }
   for (size_t i = 0; i < problem.contacts.size(); ++i) {
@@ -100,9 +102,10 @@ double JointResidual(const ContactProblem<double>& problem, const ContactScales&
   double worst = 0.0;
   for (const JointBlock<double>& joint : problem.joints) {
     for (int k = 0; k < joint.rows; ++k) {
-      const double value = RowDot(joint.a, joint.row_a[k], joint.b, joint.row_b[k], v);
-      const double scale = std::abs(joint.rhs[k]) +
-                           RowSpeed(scales, joint.a, joint.row_a[k], joint.b, joint.row_b[k]);
+      const double value = JointRowDot(joint, k, v);
+      double scale = std::abs(joint.rhs[k]) +
+                     RowSpeed(scales, joint.a, joint.row_a[k], joint.b, joint.row_b[k]);
+      if (joint.c >= 0) scale += RowSpeed(scales, joint.c, joint.row_c, joint.d, joint.row_d);
       if (!std::isfinite(scale)) return HUGE_VAL;
       worst = std::max(worst, scale > 0.0 ? std::abs(value - joint.rhs[k]) / scale : 0.0);
     }
@@ -354,11 +357,13 @@ int MostViolatedJoint(const ContactProblem<double>& problem, const std::vector<d
   for (size_t j = 0; j < problem.joints.size(); ++j) {
     const JointBlock<double>& joint = problem.joints[j];
     for (int k = 0; k < joint.rows; ++k) {
-      const double left = RowDot(joint.a, joint.row_a[k], joint.b, joint.row_b[k], v.data());
+      const double left = JointRowDot(joint, k, v.data());
       double terms = std::abs(joint.rhs[k]);
       for (int i = 0; i < 3; ++i) {
         terms += joint.a >= 0 ? std::abs(joint.row_a[k][i] * sizes[3 * joint.a + i]) : 0.0;
         terms += joint.b >= 0 ? std::abs(joint.row_b[k][i] * sizes[3 * joint.b + i]) : 0.0;
+        terms += joint.c >= 0 ? std::abs(joint.row_c[i] * sizes[3 * joint.c + i]) : 0.0;
+        terms += joint.d >= 0 ? std::abs(joint.row_d[i] * sizes[3 * joint.d + i]) : 0.0;
       }
       const double missed = std::abs(left - joint.rhs[k]);
       if (missed > share * terms) {

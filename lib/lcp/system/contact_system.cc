@@ -93,6 +93,9 @@ void ContactSystem::SetPattern(const ContactProblem<double>& problem,
   };
   for (const JointBlock<double>& joint : problem.joints) {
     add(joint.a, joint.b);
+    if (joint.c < 0) continue;
+    --block;
+    add(joint.c, joint.d);
   }
   for (size_t i = 0; i < problem.contacts.size(); ++i) {
     if (modes[i] == ContactMode::kOpen) {
@@ -171,8 +174,7 @@ void ContactSystem::AddJoints(const ContactProblem<double>& problem, double regu
       if (r >= joint.rows) {
         diagonal[4 * r] = 1.0;
       } else if (problem.redundant_joints) {
-        diagonal[4 * r] = regularisation * RowMobility(problem.mass, joint.a, joint.row_a[r],
-                                                       joint.b, joint.row_b[r]);
+        diagonal[4 * r] = regularisation * JointMobility(problem.mass, joint, r);
         regularisation_[3 * (block - 1) + r] = diagonal[4 * r];
       }
     }
@@ -188,6 +190,12 @@ void ContactSystem::AddJoints(const ContactProblem<double>& problem, double regu
     }
     if (joint.b >= 0) {
       add(joint.row_b);
+    }
+    if (joint.c >= 0) {
+      add(&joint.row_c);
+    }
+    if (joint.d >= 0) {
+      add(&joint.row_d);
     }
   }
 }

@@ -220,4 +220,11 @@ double RowMobility(const std::vector<T>& mass, int a, const RowPart<T>& row_a, i
   return sum;
 }
 
+/// The same of row k of a joint.
+template <typename T>
+double JointMobility(const std::vector<T>& mass, const JointBlock<T>& joint, int k) {
+  return RowMobility(mass, joint.a, joint.row_a[k], joint.b, joint.row_b[k]) +
+         (joint.c >= 0 ? RowMobility(mass, joint.c, joint.row_c, joint.d, joint.row_d) : 0.0);
+}
+
 }  // namespace tangible

@@ -43,8 +43,11 @@ class ContactSystem::ColumnResidual {
     int block = p_.num_bodies;
     for (const JointBlock<double>& j : p_.joints) {
       for (int k = 0; k < j.rows; ++k) {
-        Constrain(block, k, Dot(j.a, j.row_a[k], j.b, j.row_b[k]));
+        double row = Dot(j.a, j.row_a[k], j.b, j.row_b[k]);
+        if (j.c >= 0) row += Dot(j.c, j.row_c, j.d, j.row_d);
+        Constrain(block, k, row);
         Push(j.a, j.row_a[k], j.b, j.row_b[k], kSign * At(block, k));
+        if (j.c >= 0) Push(j.c, j.row_c, j.d, j.row_d, kSign * At(block, k));
       }
       ++block;
     }

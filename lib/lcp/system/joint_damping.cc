@@ -10,8 +10,10 @@ double Translation(const ContactProblem<double>& problem, int body, const RowPar
                         row[1] * row[1] / problem.mass[3 * body + 1];
 }
 
-// w of a row; 0 for a row without translation (a fixed angle), which needs none.
+// w of a row; 0 for a row without translation (a fixed angle), which needs none, and for one on
+// more bodies than a damper has.
 double WeightOf(const ContactProblem<double>& problem, const JointBlock<double>& joint, int k) {
+  if (joint.c >= 0) return 0.0;
   const double mobility =
       Translation(problem, joint.a, joint.row_a[k]) + Translation(problem, joint.b, joint.row_b[k]);
   return mobility > 0.0 ? 1.0 / mobility : 0.0;

@@ -27,6 +27,10 @@ void AddTurning(const ContactProblem<double>& problem, std::vector<Turning>* tur
       part(joint.a, joint.row_a[k]);
       part(joint.b, joint.row_b[k]);
     }
+    if (joint.c >= 0) {
+      part(joint.c, joint.row_c);
+      part(joint.d, joint.row_d);
+    }
   }
   for (const ContactBlock<double>& contact : problem.contacts) {
     part(contact.a, contact.normal_a);

@@ -14,6 +14,9 @@ void CoupledBodies::Connect(const ModelStructure& structure,
   };
   for (const JointIndex& joint : structure.joints) {
     join(joint.a, joint.b);
+    if (joint.c < 0) continue;
+    join(joint.a, joint.c);
+    join(joint.a, joint.d);
   }
   for (const ActiveContact& contact : contacts) {
     join(contact.a, contact.b);

@@ -121,6 +121,9 @@ class ModeElimination {
       for (int r = 0; r < joint.rows; ++r, ++row) {
         add(row, joint.a, joint.row_a[r], joint.b, joint.row_b[r]);
         add_force(row, joint.a, joint.row_a[r], joint.b, joint.row_b[r], T(1.0));
+        if (joint.c < 0) continue;
+        add(row, joint.c, joint.row_c, joint.d, joint.row_d);
+        add_force(row, joint.c, joint.row_c, joint.d, joint.row_d, T(1.0));
       }
     }
     for (size_t i = 0; i < p.contacts.size(); ++i) {

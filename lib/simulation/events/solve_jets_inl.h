@@ -38,10 +38,8 @@ class ImplicitResidual {
     for (size_t j = 0; j < p_.joints.size(); ++j) {
       const JointBlock<T>& joint = p_.joints[j];
       for (int k = 0; k < joint.rows; ++k) {
-        AddRowTransposed(joint.a, joint.row_a[k], joint.b, joint.row_b[k],
-                         s_.joint_impulse[3 * j + k], load.data());
-        Set(3 * (nb + static_cast<int>(j)) + k,
-            joint.rhs[k] - RowDot(joint.a, joint.row_a[k], joint.b, joint.row_b[k], v));
+        AddJointRowTransposed(joint, k, s_.joint_impulse[3 * j + k], load.data());
+        Set(3 * (nb + static_cast<int>(j)) + k, joint.rhs[k] - JointRowDot(joint, k, v));
       }
     }
     for (size_t i = 0; i < p_.contacts.size(); ++i) {

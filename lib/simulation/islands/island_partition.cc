@@ -54,6 +54,9 @@ void IslandPartition::Connect(const ModelStructure& structure) {
   }
   for (const JointIndex& joint : structure.joints) {
     Join(joint.a, joint.b);
+    if (joint.c < 0) continue;
+    Join(joint.a, joint.c);
+    Join(joint.a, joint.d);
   }
   for (const SpringIndex& spring : structure.springs) {
     Join(spring.a, spring.b);

@@ -140,6 +140,9 @@ int CountIslands(const ModelStructure& structure, const std::pair<int, int>* clo
   }
   for (const JointIndex& joint : structure.joints) {
     join(structure.bodies[joint.a].block, structure.bodies[joint.b].block);
+    if (joint.c < 0) continue;
+    join(structure.bodies[joint.a].block, structure.bodies[joint.c].block);
+    join(structure.bodies[joint.a].block, structure.bodies[joint.d].block);
   }
   for (size_t i = 0; i < num_closed; ++i) {
     join(structure.bodies[closed[i].first].block, structure.bodies[closed[i].second].block);

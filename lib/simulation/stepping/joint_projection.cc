@@ -51,7 +51,8 @@ size_t JointProjection::bytes() const {
   }
   return sizeof(double) * numbers +
          sizeof(JointRows<double>) * (iterate_.rows.capacity() + iterate_.trial_rows.capacity()) +
-         sizeof(JointCurvature<double>) * iterate_.curvature.capacity() +
+         sizeof(JointCurvature<double>) *
+             (iterate_.curvature.capacity() + iterate_.second_curvature.capacity()) +
          sizeof(iterate_.edges[0]) * iterate_.edges.capacity() + iterate_.lu.bytes();
 }
 

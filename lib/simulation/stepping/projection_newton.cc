@@ -62,15 +62,16 @@ void JointEdges(const ModelStructure& structure, std::vector<std::pair<int, int>
   edges->clear();
   int block = structure.num_blocks();
   for (const JointIndex& joint : structure.joints) {
-    const int a = structure.bodies[joint.a].block;
-    const int b = structure.bodies[joint.b].block;
-    for (const int body : {a, b}) {
+    for (const int end : {joint.a, joint.b, joint.c, joint.d}) {
+      const int body = end < 0 ? -1 : structure.bodies[end].block;
       if (body >= 0) {
         edges->emplace_back(body, block);
       }
     }
-    if (CouplesBodies(structure, joint)) {
-      edges->emplace_back(a, b);
+    for (int k = 0; k < NumShares(joint); ++k) {
+      if (!CouplesBodies(structure, joint, k)) continue;
+      const JointIndex& of = ShareOf(structure, joint, k);
+      edges->emplace_back(structure.bodies[of.a].block, structure.bodies[of.b].block);
     }
     ++block;
   }
@@ -104,14 +105,18 @@ void AddBodies(const Model<T>& model, ProjectionWeight weight, ProjectionIterate
     return;
   }
   for (size_t j = 0; j < s.joints.size(); ++j) {
-    const int a = s.bodies[s.joints[j].a].block;
-    const int b = s.bodies[s.joints[j].b].block;
-    for (int i = 0; i < 9; ++i) {
-      if (a >= 0) {
-        p->lu.Diagonal(a)[i] -= p->curvature[j].aa[i];
-      }
-      if (b >= 0) {
-        p->lu.Diagonal(b)[i] -= p->curvature[j].bb[i];
+    for (int k = 0; k < NumShares(s.joints[j]); ++k) {
+      const JointIndex& of = ShareOf(s, s.joints[j], k);
+      const JointCurvature<T>& curvature = CurvatureOf(*p, j, k);
+      const int a = s.bodies[of.a].block;
+      const int b = s.bodies[of.b].block;
+      for (int i = 0; i < 9; ++i) {
+        if (a >= 0) {
+          p->lu.Diagonal(a)[i] -= curvature.aa[i];
+        }
+        if (b >= 0) {
+          p->lu.Diagonal(b)[i] -= curvature.bb[i];
+        }
       }
     }
   }
@@ -173,10 +178,16 @@ bool FactorMatrix(const Model<T>& model, ProjectionWeight weight, ProjectionIter
     const JointIndex& joint = s.joints[j];
     add(joint.a, rows.row_a);
     add(joint.b, rows.row_b);
-    if (CouplesBodies(s, joint)) {
+    if (joint.c >= 0) {
+      add(joint.c, &rows.row_c);
+      add(joint.d, &rows.row_d);
+    }
+    for (int k = 0; k < NumShares(joint); ++k) {
+      if (!CouplesBodies(s, joint, k)) continue;
       for (int i = 0; i < 9 && weight == ProjectionWeight::kExact; ++i) {
-        lu.FirstSecond(edge)[i] -= p->curvature[j].ab[i];
-        lu.SecondFirst(edge)[3 * (i % 3) + i / 3] -= p->curvature[j].ab[i];
+        const T& entry = CurvatureOf(*p, j, k).ab[i];
+        lu.FirstSecond(edge)[i] -= entry;
+        lu.SecondFirst(edge)[3 * (i % 3) + i / 3] -= entry;
       }
       ++edge;
     }
@@ -189,7 +200,11 @@ void EvaluateCurvatures(const Model<T>& model, ProjectionIterate<T>* p) {
   const std::vector<JointIndex>& joints = model.structure->joints;
   p->curvature.resize(joints.size());
   for (size_t j = 0; j < joints.size(); ++j) {
-    EvaluateJointCurvature(model, p->at, joints[j], &p->multipliers[3 * j], &p->curvature[j]);
+    EvaluateJointCurvature(model, p->at, joints[j], 0, &p->multipliers[3 * j], &p->curvature[j]);
+    if (!joints[j].IsCoupling()) continue;
+    p->second_curvature.resize(joints.size());
+    EvaluateJointCurvature(model, p->at, joints[j], 1, &p->multipliers[3 * j],
+                           &p->second_curvature[j]);
   }
 }
 
@@ -211,6 +226,10 @@ double SolveStep(const Model<T>& model, ProjectionIterate<T>* p) {
     for (int r = 0; r < rows.rows; ++r) {
       AddRowTransposed(s.bodies[s.joints[j].a].block, rows.row_a[r], s.bodies[s.joints[j].b].block,
                        rows.row_b[r], p->multipliers[3 * j + r], p->rhs.data());
+      if (s.joints[j].c >= 0) {
+        AddRowTransposed(s.bodies[s.joints[j].c].block, rows.row_c, s.bodies[s.joints[j].d].block,
+                         rows.row_d, p->multipliers[3 * j + r], p->rhs.data());
+      }
       p->rhs[3 * (nb + j) + r] = -rows.error[r];
     }
   }
@@ -367,10 +386,10 @@ void SubtractProjectionMatrix(const Model<double>& model, const ProjectionIterat
       subtract(3 * k + i, 3 * k + i, MassOf(model, s.moving[k], i));
     }
   }
-  for (size_t j = 0; j < s.joints.size(); ++j) {
-    const int a = 3 * s.bodies[s.joints[j].a].block;
-    const int b = 3 * s.bodies[s.joints[j].b].block;
-    const JointCurvature<double>& curvature = p.curvature[j];
+  const auto subtract_curvature = [&](const JointIndex& of,
+                                      const JointCurvature<double>& curvature) {
+    const int a = 3 * s.bodies[of.a].block;
+    const int b = 3 * s.bodies[of.b].block;
     for (int i = 0; i < 9; ++i) {
       if (a >= 0) {
         subtract(a + i / 3, a + i % 3, -curvature.aa[i]);
@@ -382,6 +401,16 @@ void SubtractProjectionMatrix(const Model<double>& model, const ProjectionIterat
         subtract(a + i / 3, b + i % 3, -curvature.ab[i]);
         subtract(b + i % 3, a + i / 3, -curvature.ab[i]);
       }
+    }
+  };
+  for (size_t j = 0; j < s.joints.size(); ++j) {
+    const JointIndex& joint = s.joints[j];
+    const int a = 3 * s.bodies[joint.a].block;
+    const int b = 3 * s.bodies[joint.b].block;
+    const int c = joint.c < 0 ? -1 : 3 * s.bodies[joint.c].block;
+    const int d = joint.d < 0 ? -1 : 3 * s.bodies[joint.d].block;
+    for (int k = 0; k < NumShares(joint); ++k) {
+      subtract_curvature(ShareOf(s, joint, k), CurvatureOf(p, j, k));
     }
     for (int r = 0; r < 3; ++r) {
       const int row = 3 * (s.num_blocks() + static_cast<int>(j)) + r;
@@ -397,6 +426,14 @@ void SubtractProjectionMatrix(const Model<double>& model, const ProjectionIterat
         if (b >= 0) {
           subtract(row, b + i, p.rows[j].row_b[r][i]);
           subtract(b + i, row, -p.rows[j].row_b[r][i]);
+        }
+        if (c >= 0) {
+          subtract(row, c + i, p.rows[j].row_c[i]);
+          subtract(c + i, row, -p.rows[j].row_c[i]);
+        }
+        if (d >= 0) {
+          subtract(row, d + i, p.rows[j].row_d[i]);
+          subtract(d + i, row, -p.rows[j].row_d[i]);
         }
       }
     }

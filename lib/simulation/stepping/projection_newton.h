@@ -30,7 +30,8 @@ struct ProjectionIterate {
   State<T> from, at, trial;    ///< q̃, q, and q + a step
   std::vector<T> multipliers;  ///< μ, three for each joint
   std::vector<JointRows<T>> rows, trial_rows;
-  std::vector<JointCurvature<T>> curvature;
+  std::vector<JointCurvature<T>> curvature;         ///< of each joint, of couplings of share 0
+  std::vector<JointCurvature<T>> second_curvature;  ///< of couplings of share 1
   std::vector<std::pair<int, int>> edges;
   BlockLu<T> lu;
   std::vector<T> rhs;
@@ -74,6 +75,11 @@ double SolveProjectionStep(const Model<double>& model, ProjectionIterate<double>
 /// y −= K x, row-major with `columns` columns, after FactorProjection.
 void SubtractProjectionMatrix(const Model<double>& model, const ProjectionIterate<double>& iterate,
                               const double* x, int columns, double* y);
+
+template <typename T>
+const JointCurvature<T>& CurvatureOf(const ProjectionIterate<T>& iterate, size_t joint, int k) {
+  return k == 0 ? iterate.curvature[joint] : iterate.second_curvature[joint];
+}
 
 /// Largest |C| of a joint's rows; infinite where one is not a number.
 template <typename T>

@@ -222,6 +222,108 @@ TEST(CouplingsTest, AnArmDrivesASliderOnItself) {
   }
 }
 
+// A planet on a carrier meshes with a sun, (ω_s − ω_c) + ρ (ω_p − ω_c) = 0: three bodies. A torque
+// T between sun and carrier gives, with s = ω_s − ω_c and c = ω_c:
+//   [I_s + I_p / ρ²,  I_s − I_p / ρ;  I_s − I_p / ρ,  I_s + I_c + m d² + I_p] [ṡ; ċ] = [T; 0].
+TEST(CouplingsTest, APlanetGoesRoundASun) {
+  const std::string gears = R"({"gravity": [0, 0], "bodies": [
+      {"name": "sun", "mass": 2, "inertia": 0.5, "position": [0, 0]},
+      {"name": "carrier", "mass": 1, "inertia": 0.4, "position": [0, 0]},
+      {"name": "planet", "mass": 1.5, "inertia": 0.2, "position": [0.6, 0]}],
+    "joints": [
+      {"name": "hub", "type": "revolute", "bodies": ["carrier", "world"], "anchor": [0, 0]},
+      {"name": "axle", "type": "revolute", "bodies": ["sun", "carrier"], "anchor": [0, 0],
+       "effort": 0.7},
+      {"name": "pin", "type": "revolute", "bodies": ["planet", "carrier"], "anchor": [0.6, 0]},
+      {"name": "mesh", "type": "coupling", "joints": ["axle", "pin"], "ratio": 0.5}])";
+  const auto sun_speed = [](double is, double ip, double rho, double torque) {
+    const double a = is + ip / (rho * rho), b = is - ip / rho;
+    const double d = is + 0.4 + 1.5 * 0.36 + ip;
+    const double s = torque * d / (a * d - b * b), c = -torque * b / (a * d - b * b);
+    return s + c;
+  };
+  CoupledMotion exact = {
+      sun_speed(0.5, 0.2, 0.5, 0.7),
+      {"bodies/sun/inertia", "bodies/planet/inertia", "joints/mesh/ratio", "joints/axle/effort"},
+      {}};
+  const double at[4] = {0.5, 0.2, 0.5, 0.7};
+  for (int k = 0; k < 4; ++k) {
+    const auto beside = [&](double shift) {
+      double x[4];
+      std::copy_n(at, 4, x);
+      x[k] += shift;
+      return sun_speed(x[0], x[1], x[2], x[3]);
+    };
+    const double h = 2e-4;
+    exact.derivatives.push_back(
+        (8.0 * (beside(h) - beside(-h)) - beside(2.0 * h) + beside(-2.0 * h)) / (12.0 * h));
+  }
+  ExpectMotion(gears, "event", 0.01, 5, exact);
+}
+
+// Four bodies, two on each hinge: with q = θ_a − θ_b and 1 / J = 1 / I_a + 1 / I_b of each hinge,
+//   (J_1 + J_2 / r²) q̈_1 = T,   ω_a = q̇_1 I_b / (I_a + I_b).
+TEST(CouplingsTest, TwoHingesOfFourBodies) {
+  const std::string hinges = R"({"gravity": [0, 0], "bodies": [
+      {"name": "a", "mass": 2, "inertia": 0.5, "position": [0, 0]},
+      {"name": "b", "mass": 1, "inertia": 0.3, "position": [0, 0]},
+      {"name": "c", "mass": 1.5, "inertia": 0.2, "position": [1, 0]},
+      {"name": "d", "mass": 1.5, "inertia": 0.4, "position": [1, 0]}],
+    "joints": [
+      {"name": "p", "type": "revolute", "bodies": ["a", "b"], "anchor": [0, 0], "effort": 0.7},
+      {"name": "q", "type": "revolute", "bodies": ["c", "d"], "anchor": [1, 0]},
+      {"name": "belt", "type": "coupling", "joints": ["p", "q"], "ratio": -1.6}])";
+  const double j1 = 0.5 * 0.3 / 0.8, j2 = 0.2 * 0.4 / 0.6, r = -1.6;
+  const double speed = 0.7 / (j1 + j2 / (r * r)) * 0.3 / 0.8;
+  const CoupledMotion exact = {speed,
+                               {"joints/p/effort", "joints/belt/ratio"},
+                               {speed / 0.7, speed / (j1 + j2 / (r * r)) * 2.0 * j2 / (r * r * r)}};
+  ExpectMotion(hinges, "event", 0.05, 5, exact);
+  ExpectMotion(hinges, "fixed", 0.01, 5, exact);
+}
+
+// A rope from a weight over a swinging pulley to another one: its length stays, and so does the
+// energy.
+TEST(CouplingsTest, ARopeOverAPulleyThatSwings) {
+  for (const char* stepping : {"event", "fixed"}) {
+    const Scene scene = SceneOf(std::string(R"({"gravity": [0, -10], "bodies": [
+        {"name": "left", "mass": 1, "inertia": 0.1, "position": [-0.5, -1.2]},
+        {"name": "right", "mass": 1.3, "inertia": 0.1, "position": [0.7, -1]},
+        {"name": "pulley", "mass": 2, "inertia": 0.4, "position": [0.2, 0]}],
+      "joints": [
+        {"name": "pin", "type": "revolute", "bodies": ["pulley", "world"], "anchor": [0, 0.5]},
+        {"name": "l", "type": "distance", "bodies": ["left", "pulley"],
+         "anchors": [[-0.5, -1.1], [0, 0]], "limits": [0, null]},
+        {"name": "r", "type": "distance", "bodies": ["pulley", "right"],
+         "anchors": [[0.4, 0], [0.7, -0.9]], "limits": [0, null]},
+        {"name": "rope", "type": "coupling", "joints": ["l", "r"], "ratio": 1}],
+      "simulation": {"duration": 0.4, "dt": 0.002, "joint_correction": "projection",
+        "stepping": ")") + stepping +
+                                "\"}}");
+    const std::vector<std::string> paths = {"bodies/left/mass", "joints/rope/ratio", "gravity/y",
+                                            "joints/pin/anchor/x"};
+    const GradientResult result = testing::Jacobian(scene, paths, GradientMethod::kAdjoint);
+    testing::ExpectOthersAgree(scene, paths, result);
+    const VectorX<double>& x = result.values;
+    const auto point = [&](int body, double along, double up) {
+      const double c = std::cos(x[6 * body + 2]), s = std::sin(x[6 * body + 2]);
+      return Vector2<double>(x[6 * body] + c * along - s * up,
+                             x[6 * body + 1] + s * along + c * up);
+    };
+    const double length = (point(0, 0.0, 0.1) - point(2, -0.2, 0.0)).norm() +
+                          (point(1, 0.0, 0.1) - point(2, 0.2, 0.0)).norm();
+    EXPECT_NEAR(length, std::hypot(0.5, 1.1) + std::hypot(0.3, 0.9), 1e-9) << stepping;
+    if (stepping == std::string("fixed")) continue;
+    double energy = 10.0 * (1.0 * 1.2 + 1.3 * 1.0);
+    const double mass[] = {1.0, 1.3, 2.0}, inertia[] = {0.1, 0.1, 0.4};
+    for (int k = 0; k < 3; ++k) {
+      energy += 0.5 * mass[k] * (x[6 * k + 3] * x[6 * k + 3] + x[6 * k + 4] * x[6 * k + 4]) +
+                0.5 * inertia[k] * x[6 * k + 5] * x[6 * k + 5] + 10.0 * mass[k] * x[6 * k + 1];
+    }
+    EXPECT_NEAR(energy, 0.0, 1e-7);
+  }
+}
+
 // Play between two gears: the first turns freely by H, strikes, and the rate of the coupling is
 // −e times what it was:  θ_1 = H + w (1 − (1 + e) k) (t − H / w),  k = 1 / (1 + r² I_1 / I_2).
 TEST(CouplingsTest, PlayEndsInAnImpact) {
