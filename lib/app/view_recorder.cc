@@ -42,7 +42,14 @@ ViewRecorder::ViewRecorder(const Scene& scene, const Model<double>& model) {
   data_.name = scene.name;
   data_.gravity = scene.gravity;
   for (const auto& body : scene.bodies) {
-    data_.bodies.push_back({body.name, body.motion, body.shape, body.contact_points});
+    ViewBody& view = data_.bodies.emplace_back(
+        ViewBody{body.name, body.motion, body.shape, body.contact_points});
+    if (!body.support) continue;
+    view.support_points = body.support->points;
+    view.support_radius = body.support->radius.value_or(0.0);
+    if (!body.support->radius && view.support_points.empty()) {
+      view.support_points.push_back(Vector2<double>::Zero());
+    }
   }
   for (const JointIndex& joint : s.joints) {
     data_.joints.push_back(MakeJoint(model, joint));

@@ -134,13 +134,18 @@ void WriteBodies(const ViewData& data, const std::vector<ViewFrame>& frames, Jso
       json->Key("solid");
       json->Number(body.shape.solid == SolidSide::kLeft ? 1.0 : -1.0);
     }
-    if (!body.contact_points.empty()) {
-      json->Key("points");
+    const auto write_points = [json](const char* key, const auto& points) {
+      if (points.empty()) return;
+      json->Key(key);
       json->Open('[');
-      for (const Vector2<double>& point : body.contact_points) {
-        WriteVector(point, json);
-      }
+      for (const Vector2<double>& point : points) WriteVector(point, json);
       json->Close(']');
+    };
+    write_points("points", body.contact_points);
+    write_points("support", body.support_points);
+    if (body.support_radius > 0.0) {
+      json->Key("support_radius");
+      json->Number(body.support_radius);
     }
     if (body.motion == Motion::kStatic) {
       json->Key("pose");

@@ -23,6 +23,8 @@ struct ViewBody {
   Motion motion = Motion::kMoving;
   BasicShape<double> shape;
   std::vector<Vector2<double>> contact_points = {};  ///< body frame, m
+  std::vector<Vector2<double>> support_points = {};  ///< body frame, m
+  double support_radius = 0.0;                       ///< m, of a disc; 0: none
 };
 
 /// A joint; an anchor is in the frame of its body, and in the world where the body is −1.

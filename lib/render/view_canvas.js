@@ -217,6 +217,19 @@ function drawContactPoints(g, body, pose) {
   for (const point of body.points || []) { disc(g, toScreen(toWorld(pose, point)), 3); g.fill(); }
 }
 // The line, with strokes of equal distance on the side of the solid.
+// Where a body stands on the plane of motion: a cross at each point, or the outline of a disc.
+function drawSupport(g, body, pose) {
+  g.strokeStyle = bodyColour(body); g.lineWidth = 1.2;
+  for (const point of body.support || []) {
+    const [x, y] = toScreen(toWorld(pose, point));
+    line(g, [x - 4, y - 4], [x + 4, y + 4]); line(g, [x - 4, y + 4], [x + 4, y - 4]);
+  }
+  if (!body.support_radius) return;
+  g.setLineDash([2, 3]);
+  disc(g, toScreen([pose[0], pose[1]]), body.support_radius * camera.scale); g.stroke();
+  g.setLineDash([]);
+}
+
 function drawPolyline(g, body, pose) {
   const points = body.core.points.map((p) => toScreen(toWorld(pose, p)));
   if (body.closed) points.push(points[0]);
@@ -356,7 +369,9 @@ function drawStage(k, hovered) {
   const poses = view.bodies.map((_, i) => poseOf(k, i));
   view.bodies.forEach((body, i) => { if (poses[i] && body.motion === "static") drawBody(g, body, poses[i], i === hovered); });
   view.bodies.forEach((body, i) => { if (poses[i] && body.motion !== "static") drawBody(g, body, poses[i], i === hovered); });
-  view.bodies.forEach((body, i) => { if (poses[i]) drawContactPoints(g, body, poses[i]); });
+  view.bodies.forEach((body, i) => {
+    if (poses[i]) { drawContactPoints(g, body, poses[i]); drawSupport(g, body, poses[i]); }
+  });
   if (show.joints) {
     for (const spring of view.springs) drawSpring(g, spring, k);
     for (const joint of view.joints) drawJoint(g, joint, k);

@@ -46,6 +46,12 @@ class FieldReader {
     const int size = points.ExpectArray("an array of points [x, y]");
     for (int i = 0; i < size; ++i) values.push_back(points.At(i).Point());
   }
+  void List(const Field& field, std::vector<double>& values) {
+    if (!IsRead(field)) return;
+    const JsonReader list = item_.At(field.key);
+    const int size = list.ExpectArray("an array of numbers");
+    for (int i = 0; i < size; ++i) values.push_back(list.At(i).Number(field.kind));
+  }
   void Anchors(const Field& field, Vector2<double> (&anchors)[2]) {
     const JsonReader reader = item_.At(field.key);
     if (reader.Size() != 2) return reader.FailExpected("an array of 2 points [[x, y], [x, y]]");

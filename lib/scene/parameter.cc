@@ -119,6 +119,13 @@ std::string ExplainNoParameter(const Scene& scene, const std::string& path) {
            " has no inertia of its own: it follows mass and shape; write \"inertia\" in the scene "
            "to make it a parameter";
   }
+  for (const auto& body : scene.bodies) {
+    if (!body.support || body.support->load || Components(path).back() == "*") continue;
+    if (!MatchesPath(path, "bodies/" + body.name + "/support/load")) continue;
+    return "the support of body " + body.name +
+           " has no load of its own: it is mass * 9.81; write \"load\" in the scene to make it a "
+           "parameter";
+  }
   const std::vector<JointPlace> places = ClassifyJoints(scene);
   for (std::size_t i = 0; i < places.size(); ++i) {
     const auto& joint = scene.joints[i];

@@ -64,6 +64,11 @@ class NumberList {
       AddPoint(field, i, &values[i].x(), &values[i].y());
     }
   }
+  void List(const Field& field, std::vector<T>& values) {
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      Add(field, "/" + std::to_string(i), &values[i]);
+    }
+  }
   void Anchors(const Field& field, Vector2<T> (&anchors)[2]) {
     for (std::size_t i = 0; i < 2; ++i) AddPoint(field, i, &anchors[i].x(), &anchors[i].y());
   }
@@ -149,6 +154,10 @@ class ItemNumbers {
     Number(field, static_cast<double>(values.size()));
     for (const Vector2<double>& value : values) Point(field, value);
   }
+  void List(const Field& field, const std::vector<double>& values) {
+    Number(field, static_cast<double>(values.size()));
+    for (const double value : values) Number(field, value);
+  }
   void Anchors(const Field& field, const Vector2<double> (&anchors)[2]) {
     for (const Vector2<double>& anchor : anchors) Point(field, anchor);
   }
@@ -206,6 +215,10 @@ class SetNumbers {
   void Points(const Field& field, std::vector<Vector2<T>>& values) {
     values.resize(static_cast<std::size_t>(*next_++));
     for (Vector2<T>& value : values) Point(field, value);
+  }
+  void List(const Field& field, std::vector<T>& values) {
+    values.resize(static_cast<std::size_t>(*next_++));
+    for (T& value : values) Number(field, value);
   }
   void Anchors(const Field& field, Vector2<T> (&anchors)[2]) {
     for (Vector2<T>& anchor : anchors) Point(field, anchor);

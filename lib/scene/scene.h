@@ -51,6 +51,22 @@ struct BasicDrivenMotion {
   T offset_angle{0.0};                ///< rad
 };
 
+/// m/s², of the load of a support that the scene leaves out: mass · 9.81.
+inline constexpr double kStandardGravity = 9.81;
+
+/// Coulomb friction of a moving body on the plane of motion, as of a table seen from above. At each
+/// of the points |f_i| ≤ friction · N_i, N_i = load · share_i / Σ shares; with a radius the body
+/// stands on a disc about its centre of mass that presses evenly; with neither the friction acts at
+/// the centre of mass and gives no torque.
+template <typename T>
+struct BasicSupport {
+  T friction{0.0};                 ///< Coulomb coefficient, ≥ 0
+  std::optional<T> load;           ///< N, > 0; absent: mass · kStandardGravity
+  std::vector<Vector2<T>> points;  ///< body frame, m
+  std::vector<T> shares;           ///< > 0, one for each point; empty: equal
+  std::optional<T> radius;         ///< m, > 0; excludes points
+};
+
 template <typename T>
 struct BasicBody {
   std::string name;
@@ -73,6 +89,7 @@ struct BasicBody {
   T linear_damping{0.0};            ///< N s/m, ≥ 0: force −c v
   T angular_damping{0.0};           ///< N m s, ≥ 0
   std::optional<T> quadratic_drag;  ///< N s²/m², ≥ 0: force −c |v| v
+  std::optional<BasicSupport<T>> support;
 };
 
 /// kRope is what a model makes of a distance joint with limits, which keeps no distance, and

@@ -11,6 +11,7 @@
 //   Optional        the same, or absent
 //   Point           [x, y]
 //   Points          [[x, y], ...]
+//   List            [1.5, ...], or absent
 //   Anchors         [[x, y], [x, y]]
 //   Interval        [low, high], or absent; null: infinite
 //   Numbers         two numbers of a shape: [w, h]
@@ -144,6 +145,24 @@ void VisitDrivenMotion(Body& body, Visitor* visitor) {
   });
 }
 
+/// The friction of a body on the plane of motion.
+template <typename Body, typename Visitor>
+void VisitSupport(Body& body, Visitor* visitor) {
+  visitor->Part({"support"}, body.support, [](auto& support, auto* fields) {
+    constexpr NumberKind kPositive = NumberKind::kPositive;
+    fields->Number({"friction", NumberKind::kNonNegative, Dimension::kNone, true},
+                   support.friction);
+    fields->Optional({"load", kPositive, Dimension::kForce}, support.load);
+    fields->Points({"points", NumberKind::kFree, Dimension::kLength}, support.points);
+    Field shares{"shares", kPositive};
+    shares.with = "points";
+    shares.with_form = "an array of points";
+    shares.present = !support.points.empty();
+    fields->List(shares, support.shares);
+    fields->Optional({"radius", kPositive, Dimension::kLength}, support.radius);
+  });
+}
+
 /// The fields of a body but its shape.
 template <typename Body, typename Visitor>
 void VisitBody(Body& body, Visitor* visitor) {
@@ -173,6 +192,7 @@ void VisitBody(Body& body, Visitor* visitor) {
   visitor->Optional({"quadratic_drag", kNonNegative, Dimension::kQuadraticDrag, false, moves},
                     body.quadratic_drag);
   VisitFrictionDecay(body, visitor);
+  VisitSupport(body, visitor);
 }
 
 template <typename Body, typename Visitor>
@@ -332,6 +352,10 @@ class FieldKeys {
   }
   template <typename V>
   void Points(const Field& field, const V&) {
+    Add(field.key);
+  }
+  template <typename V>
+  void List(const Field& field, const V&) {
     Add(field.key);
   }
   template <typename V>

@@ -53,6 +53,9 @@ class FieldWriter {
   void Points(const Field& field, const std::vector<Vector2<double>>& values) {
     for (const Vector2<double>& value : values) json_[field.key].push_back(PointJson(value));
   }
+  void List(const Field& field, const std::vector<double>& values) {
+    for (const double value : values) json_[field.key].push_back(value);
+  }
   void Anchors(const Field& field, const Vector2<double> (&anchors)[2]) {
     json_[field.key] = OrderedJson::array({PointJson(anchors[0]), PointJson(anchors[1])});
   }

@@ -52,6 +52,10 @@ class FieldSchema {
     Add(field, SchemaOfArray(PointSchema(field), 0));
   }
   template <typename V>
+  void List(const Field& field, const V&) {
+    Add(field, SchemaOfArray(NumberSchema(field), 1));
+  }
+  template <typename V>
   void Anchors(const Field& field, const V&) {
     Add(field, SchemaOfArray(PointSchema(field), 2, 2));
   }
@@ -195,6 +199,9 @@ OrderedJson BodySchema() {
   schema["dependentSchemas"]["motion"] = {
       {"not", {{"anyOf", OrderedJson::array({has("velocity"), has("angular_velocity")})}}}};
   schema["properties"]["motion"]["oneOf"] = OrderedJson::array({has("file"), has("time")});
+  OrderedJson& support = schema["properties"]["support"];
+  support["properties"]["points"]["minItems"] = 1;
+  support["not"] = {{"required", {"points", "radius"}}};
   return schema;
 }
 

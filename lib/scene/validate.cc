@@ -41,6 +41,11 @@ class RangeCheck {
       CheckPoint(field, values[i], [&] { return Place(field).At(static_cast<int>(i)); });
     }
   }
+  void List(const Field& field, const std::vector<double>& values) {
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      Check(field.kind, values[i], [&] { return Place(field).At(static_cast<int>(i)); });
+    }
+  }
   void Anchors(const Field& field, const Vector2<double> (&anchors)[2]) {
     for (int i = 0; i < 2; ++i) CheckPoint(field, anchors[i], [&] { return Place(field).At(i); });
   }
@@ -127,6 +132,26 @@ void CheckDrivenMotion(const BasicBody<double>& body, const JsonReader& place) {
   }
 }
 
+// What the fields alone do not tell of a support.
+void CheckSupport(const BasicBody<double>& body, const JsonReader& place) {
+  const BasicSupport<double>& support = *body.support;
+  if (body.motion != Motion::kMoving) {
+    place.Fail("expected a moving body, got a static or kinematic one");
+  } else if (place.At("points").exists() && support.points.empty()) {
+    place.At("points").FailExpected("an array of at least one point");
+  } else if (support.radius && !support.points.empty()) {
+    place.At("radius").FailExpected("none beside points (a body stands on points or on a disc)",
+                                    *support.radius);
+  } else if (support.points.empty() && !support.shares.empty()) {
+    place.At("points").Fail("missing, expected an array of points with shares");
+  } else if (!support.points.empty() && (place.At("shares").exists() || !support.shares.empty()) &&
+             support.shares.size() != support.points.size()) {
+    place.At("shares").Fail("expected " + std::to_string(support.points.size()) +
+                            " numbers > 0, one for each point, got " +
+                            std::to_string(support.shares.size()));
+  }
+}
+
 }  // namespace
 
 void CheckBody(const BasicBody<double>& body, const JsonReader& place) {
@@ -145,6 +170,7 @@ void CheckBody(const BasicBody<double>& body, const JsonReader& place) {
         "missing, expected a number > 0 for a polygon whose centroid is not the origin");
   }
   if (body.driven) CheckDrivenMotion(body, place.At("motion"));
+  if (body.support) CheckSupport(body, place.At("support"));
   if (is_static && body.velocity != Vector2<double>(0.0, 0.0)) {
     place.At("velocity").Fail("expected [0, 0] of a static body, got a velocity (kinematic moves)");
   }

@@ -75,8 +75,8 @@ TEST(BadSceneTest, Bodies) {
        "contact_points, mass, inertia, position, angle, motion, velocity, angular_velocity, "
        "friction, "
        "restitution, "
-       "linear_damping, angular_damping, quadratic_drag, kinetic_friction, stribeck_speed, got "
-       "\"masss\""},
+       "linear_damping, angular_damping, quadratic_drag, kinetic_friction, stribeck_speed, "
+       "support, got \"masss\""},
       {"/bodies/0/kinetic_friction", "0.1",
        "/bodies/0/stribeck_speed: missing, expected a number > 0"},
       {"/bodies/0/stribeck_speed", "0.1",
@@ -499,6 +499,33 @@ TEST(BadSceneTest, Signals) {
       {"/forces/0/force", R"({"time": [0], "value": [1]})",
        "/forces/0/force/value: unknown key, expected one of time, x, y, interpolation, got "
        "\"value\""},
+  });
+}
+
+TEST(BadSceneTest, Supports) {
+  Check({
+      {"/bodies/0/support", "0.3", "/bodies/0/support: expected an object, got 0.3"},
+      {"/bodies/0/support", "{}", "/bodies/0/support/friction: missing, expected a number >= 0"},
+      {"/bodies/0/support", R"({"friction": -1})",
+       "/bodies/0/support/friction: expected a number >= 0, got -1"},
+      {"/bodies/0/support", R"({"friction": 1, "load": 0})",
+       "/bodies/0/support/load: expected a number > 0, got 0"},
+      {"/bodies/0/support", R"({"friction": 1, "radius": 0})",
+       "/bodies/0/support/radius: expected a number > 0, got 0"},
+      {"/bodies/0/support", R"({"friction": 1, "points": []})",
+       "/bodies/0/support/points: expected an array of at least one point, got an array of 0"},
+      {"/bodies/0/support", R"({"friction": 1, "points": [[0, 0]], "radius": 1})",
+       "/bodies/0/support/radius: expected none beside points (a body stands on points or on a "
+       "disc), got 1"},
+      {"/bodies/0/support", R"({"friction": 1, "points": [[0, 0], [1, 0]], "shares": [1]})",
+       "/bodies/0/support/shares: expected 2 numbers > 0, one for each point, got 1"},
+      {"/bodies/0/support", R"({"friction": 1, "points": [[0, 0], [1, 0]], "shares": [1, -2]})",
+       "/bodies/0/support/shares/1: expected a number > 0, got -2"},
+      {"/bodies/0/support", R"({"friction": 1, "shares": [1]})",
+       "/bodies/0/support/points: missing, expected an array of points with shares"},
+      {"/bodies/0/support", R"({"friction": 1, "mu": 1})",
+       "/bodies/0/support/mu: unknown key of a support, expected one of friction, load, points, "
+       "shares, radius, got \"mu\""},
   });
 }
 

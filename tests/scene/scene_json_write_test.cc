@@ -86,6 +86,34 @@ TEST(SceneToJsonTest, ServosAreReadAndWritten) {
   EXPECT_EQ(cast.forces[0].torque_servo->target_signal->value, (std::vector<double>{0.0, 2.0}));
 }
 
+TEST(SceneToJsonTest, SupportsAreReadAndWritten) {
+  const char text[] = R"({"bodies": [
+      {"name": "a", "mass": 1, "inertia": 1, "position": [0, 0], "support": {"friction": 0.3}},
+      {"name": "b", "mass": 1, "inertia": 1, "position": [0, 0],
+       "support": {"friction": 0.3, "load": 4.5, "points": [[0.1, 0.0], [-0.1, 0.25]],
+                   "shares": [1.0, 2.0]}},
+      {"name": "c", "mass": 1, "inertia": 1, "position": [0, 0],
+       "support": {"friction": 0.0, "radius": 0.5}}]})";
+  const Scene scene = Parsed(text);
+  const Json before = Json::parse(text);
+  const Json after = Json::parse(SceneToJson(scene));
+  for (size_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(after["bodies"][i]["support"], before["bodies"][i]["support"]);
+  }
+  BasicScene<Jet<kLocalJetWidth>> cast = CastScene<Jet<kLocalJetWidth>>(scene);
+  std::vector<std::string> paths;
+  for (const auto& number : EnumerateNumbers(&cast)) {
+    if (number.path.find("/support/") != std::string::npos) paths.push_back(number.path);
+  }
+  EXPECT_EQ(
+      paths,
+      (std::vector<std::string>{
+          "bodies/a/support/friction", "bodies/b/support/friction", "bodies/b/support/load",
+          "bodies/b/support/points/0/x", "bodies/b/support/points/0/y",
+          "bodies/b/support/points/1/x", "bodies/b/support/points/1/y", "bodies/b/support/shares/0",
+          "bodies/b/support/shares/1", "bodies/c/support/friction", "bodies/c/support/radius"}));
+}
+
 TEST(SceneToJsonTest, ALimitThatLimitsNothingIsNull) {
   Json text = Json::parse(kFullScene);
   text["joints"][3]["limits"] = {0.0, nullptr};

@@ -96,6 +96,11 @@ Coverage CoverageOf(const Scene& scene, const RunTrace& run) {
     if (body.quadratic_drag) {
       coverage["drag of a body"] = 1;
     }
+    if (body.support) {
+      coverage[body.support->radius           ? "support of a disc"
+               : body.support->points.empty() ? "support of a centre"
+                                              : "support of points"] = 1;
+    }
     if (body.kinetic_friction) {
       coverage["friction of a body that decays"] = 1;
     }

@@ -296,6 +296,31 @@ void SceneMaker::Ends() {
   }
 }
 
+void SceneMaker::Supports() {
+  if (seed_ % 4 != 2 || options_.stepping == Stepping::kEvent) {
+    return;
+  }
+  RandomNumbers random(0x73757070ULL + 0x9e3779b97f4a7c15ULL * seed_);
+  for (BasicBody<double>& body : scene_.bodies) {
+    if (body.motion != Motion::kMoving || !random.Chance(0.6)) continue;
+    BasicSupport<double>& support = body.support.emplace();
+    // Gravity lies in the plane: from a body that it drags along to one that it cannot move.
+    support.friction = std::pow(10.0, random.Uniform(-2.0, 0.3));
+    if (random.Chance(0.5)) support.load = body.mass * random.Uniform(1.0, 20.0);
+    const double size = random.Uniform(0.05, 0.3);
+    if (random.Chance(0.3)) {
+      support.radius = size;
+    } else if (random.Chance(0.6)) {
+      for (int k = random.Integer(1, 4); k > 0; --k) {
+        support.points.emplace_back(random.Uniform(-size, size), random.Uniform(-size, size));
+      }
+      for (size_t k = 0; k < support.points.size() && support.points.size() > 2; ++k) {
+        support.shares.push_back(random.Uniform(0.5, 2.0));
+      }
+    }
+  }
+}
+
 void SceneMaker::Outlines() {
   if (seed_ % 4 != 1) {
     return;

@@ -82,6 +82,7 @@ Scene SceneMaker::Make() {
   Servos();
   Couplings();
   Ends();
+  Supports();
   return scene_;
 }
 

@@ -77,6 +77,8 @@ class SceneMaker {
   /// Couplings of joints and joints that end, in every fourth scene, likewise.
   void Couplings();
   void Ends();
+  /// Friction of bodies on the plane of motion in every fourth scene of fixed steps, likewise.
+  void Supports();
   /// A servo whose coordinate starts at `at`.
   BasicServo<double> Servo(double at, RandomNumbers* random);
 

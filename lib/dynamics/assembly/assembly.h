@@ -24,6 +24,7 @@
 #include "tangible/dynamics/elements/force.h"
 #include "tangible/dynamics/elements/row_rates.h"
 #include "tangible/dynamics/elements/servo.h"
+#include "tangible/dynamics/elements/support.h"
 
 namespace tangible {
 

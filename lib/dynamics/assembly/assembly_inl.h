@@ -11,6 +11,7 @@
 #include "tangible/dynamics/assembly/assembly.h"
 #include "tangible/dynamics/assembly/equations_inl.h"
 #include "tangible/dynamics/elements/servo_inl.h"
+#include "tangible/dynamics/elements/support_inl.h"
 #include "tangible/dynamics/model/driven_bodies.h"
 #include "tangible/dynamics/model/tolerances.h"
 #include "tangible/math/scratch.h"
@@ -98,13 +99,14 @@ class ProblemBuilder {
     }
     scratch_.joints.resize(s_.joints.size());
     scratch_.rates.resize(kLevel == Level::kAcceleration ? s_.joints.size() : 1);
-    p_.joints.reserve(s_.joints.size());
+    p_.joints.reserve(s_.joints.size() + s_.supports.size());
     for (size_t j = 0; j < s_.joints.size(); ++j) {
       equations_.Joint(static_cast<int>(j));
       equations_.JointSpring(static_cast<int>(j));
       equations_.JointFrictionDecay(static_cast<int>(j));
     }
     for (size_t k = 0; k < s_.servos.size(); ++k) equations_.Servo(static_cast<int>(k));
+    for (size_t k = 0; k < s_.supports.size(); ++k) equations_.Support(static_cast<int>(k));
   }
 
   /// `restitution` may be null if no contact rebounds.
@@ -147,6 +149,10 @@ class ProblemBuilder {
   const T& Time() const { return at_.time; }
   int ModeOf(int servo, const ServoTime<T>& time) const {
     return ServoMode(model_, state_, servo, time);
+  }
+
+  const SupportState* SupportAt(int k) const {
+    return state_.supports.empty() ? nullptr : &state_.supports[k];
   }
 
   void Body(int k, const T mass[3], const T load[3]) {
@@ -205,6 +211,21 @@ class ProblemBuilder {
       }
     }
     if (joint.c >= 0 && rows.rows > 0) Widen(joint, rows, &block);
+  }
+
+  // Every support has a block, so that those of others stay where they are as it holds or slides.
+  void Hold(int k, const RowPart<T>* rows, int count) {
+    JointBlock<T>& block = p_.joints.emplace_back();
+    block.a = s_.bodies[s_.supports[k].body].block;
+    block.rows = count;
+    for (int r = 0; r < count; ++r) {
+      block.row_a[r] = rows[r];
+      block.row_b[r] = {T(0.0), T(0.0), T(0.0)};
+      block.rhs[r] = T(0.0);
+    }
+    // The rows of joints to what stands still, or of joints between bodies that are held, may be
+    // dependent on these.
+    if (count > 0 && !s_.joints.empty()) p_.redundant_joints = true;
   }
 
   void Contact(int i, const ActiveContact& contact, const ContactRows<T>& rows, const T& c_n,

@@ -18,6 +18,7 @@
 //   Restitution(i), Approach(contact, rows)   of contact i: e, and n·v before the step
 //   Time()                                    of accelerations
 //   ModeOf(servo, time)                       of a servo: servo.h
+//   SupportAt(support)                        of a support: its SupportState, or null
 //
 // and takes
 //
@@ -27,6 +28,7 @@
 //   Along(a, row_a, b, row_b, push, damping)  load += rowᵀ (push − damping · speed)
 //   Decay(a, row_a, b, row_b, numbers)        load += rowᵀ FrictionDecay(numbers, speed)
 //   Joint(j, rows, rhs)                       row · x = rhs − prescribed speed
+//   Hold(support, rows, count)                row · x = 0 of its body
 //   Share(j, k, rows, rhs)                    coordinate k's share of a coupling's row; builders
 //                                             that keep joints receive the whole row
 //   BeginShare(k)                             the contact that follows is one such share
@@ -179,6 +181,24 @@ class Equations {
     }
   }
 
+  /// Friction of a body on the plane of motion: each point of its support is an element.
+  void Support(int k) {
+    if constexpr (kLevel == Level::kVelocity) {
+      const SupportIndex& support = s_.supports[k];
+      const SupportState* at = Weight() > 0.0 ? b_.SupportAt(k) : nullptr;
+      if (at == nullptr) return Hold(k, -1);
+      if (at->holds == SupportState::kBody) return HoldBody(k);
+      if (support.kind == SupportIndex::kDisc) {
+        DiscSlides(support, *at);
+      } else {
+        for (int i = 0; i < support.num_points; ++i) {
+          if (i != at->holds) PointSlides(support, i, *at);
+        }
+      }
+      Hold(k, at->holds);
+    }
+  }
+
   /// What the friction of a joint that slides is below that at rest. Steps of a fixed size do not
   /// have it (settings.h).
   void JointFrictionDecay(int j) {
@@ -315,6 +335,84 @@ class Equations {
     ScaleToShare(coupling.type, k, numbers, share);
     if (k == 1) rates->coordinate = number * rates->coordinate;
     rates->row[0] = rates->coordinate;
+  }
+
+  // The arm of a point of a support, and its share of the load.
+  Vector2<T> ArmOf(const SupportIndex& support, int point, T* share) {
+    const auto& pose = b_.PoseOf(support.body);
+    *share = T(1.0);
+    if (support.kind == SupportIndex::kCentre) return Vector2<T>(T(0.0), T(0.0));
+    T buffer[3];
+    const T* x = b_.Numbers(support.Point(point), 3, buffer);
+    *share = x[2];
+    return pose.rotation * Vector2<T>(x[0], x[1]);
+  }
+
+  void PointSlides(const SupportIndex& support, int point, const SupportState& at) {
+    using std::sqrt;
+    b_.Begin();
+    T share, cone[2];
+    const Vector2<T> arm = ArmOf(support, point, &share);
+    const T* x = b_.Numbers(support.numbers, 2, cone);
+    const T limit = Weight() * x[SupportIndex::kFriction] * x[SupportIndex::kLoad] * share;
+    const Vector2<T> velocity(at.twist[0] - at.twist[2] * arm.y(),
+                              at.twist[1] + at.twist[2] * arm.x());
+    const T square = velocity.squaredNorm();
+    if (!(ValueOf(square) > 0.0)) return;
+    const T speed = sqrt(square);
+    const Vector2<T> along = velocity / speed;
+    const RowPart<T> none{T(0.0), T(0.0), T(0.0)};
+    b_.Push(support.body, PointRow(along, arm), s_.world(), none, T(-limit));
+    b_.Along(support.body, PointRow(Vector2<T>(-along.y(), along.x()), arm), s_.world(), none,
+             T(0.0), T(limit / speed));
+  }
+
+  // The friction at û and, as dampers, Ψ'' in the form Σ d lᵀ l of a Cholesky factorisation.
+  void DiscSlides(const SupportIndex& support, const SupportState& at) {
+    b_.Begin();
+    T buffer[3], friction[3];
+    const T* x = b_.Numbers(support.numbers, 3, buffer);
+    const T twist[3] = {T(at.twist[0]), T(at.twist[1]), T(at.twist[2])};
+    DiscFriction(x[SupportIndex::kRadius], twist, friction);
+    const T limit = Weight() * x[SupportIndex::kFriction] * x[SupportIndex::kLoad];
+    const double weight = ValueOf(limit);
+    const double radius = ValueOf(x[SupportIndex::kRadius]);
+    for (T& component : friction) component *= limit;
+    b_.AddForce(support.body, friction);
+    double rows[3][3], weights[3];
+    DiscDampers(radius, at.twist.data(), rows, weights);
+    b_.Begin();
+    const RowPart<T> none{T(0.0), T(0.0), T(0.0)};
+    for (int r = 0; r < 3; ++r) {
+      double speed = 0.0;
+      for (int i = 0; i < 3; ++i) speed += rows[r][i] * at.twist[i];
+      const RowPart<T> row{T(rows[r][0]), T(rows[r][1]), T(rows[r][2])};
+      b_.Along(support.body, row, s_.world(), none, T(weight * weights[r] * speed),
+               T(weight * weights[r]));
+    }
+  }
+
+  // The rows of a point that is held; −1: none.
+  void Hold(int k, int point) {
+    RowPart<T> rows[3];
+    int count = 0;
+    if (point >= 0) {
+      b_.Begin();
+      T share;
+      const Vector2<T> arm = ArmOf(s_.supports[k], point, &share);
+      rows[0] = PointRow(Vector2<T>(T(1.0), T(0.0)), arm);
+      rows[1] = PointRow(Vector2<T>(T(0.0), T(1.0)), arm);
+      count = 2;
+    }
+    b_.Hold(k, rows, count);
+  }
+  void HoldBody(int k) {
+    RowPart<T> rows[3];
+    for (int r = 0; r < 3; ++r) {
+      for (int i = 0; i < 3; ++i) rows[r][i] = T(r == i ? 1.0 : 0.0);
+    }
+    b_.Begin();
+    b_.Hold(k, rows, 3);
   }
 
   void ServoDamper(const ServoIndex& servo, double target_rate) {

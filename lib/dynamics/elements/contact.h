@@ -42,7 +42,8 @@ struct ActiveContact {
   double side = 0.0;  ///< of a limit: +1 low, −1 high; 0 of friction in a joint
   /// Of the motor of a joint, which is friction about its speed (IsJointFriction holds).
   bool is_motor = false;
-  bool is_servo = false;  ///< names the event of a servo, of a joint or on body a; no contact
+  bool is_servo = false;    ///< names the event of a servo, of a joint or on body a; no contact
+  bool is_support = false;  ///< names the support of body a; no contact
   ContactLaw law = ContactLaw::kGap;
   double gap = 0.0;  ///< m (rad for the limit of an angle), at the step's start
   bool IsJointFriction() const { return joint >= 0 && side == 0.0; }

@@ -68,6 +68,7 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
       equations_.JointFrictionDecay(j);
     }
     for (int k = 0; k < static_cast<int>(s_.servos.size()); ++k) equations_.Servo(k);
+    for (int k = 0; k < static_cast<int>(s_.supports.size()); ++k) equations_.Support(k);
     for (size_t i = 0; i < solved_.contacts->size(); ++i) {
       const ActiveContact& contact = (*solved_.contacts)[i];
       if ((*solved_.contact_block)[i] < 0) {
@@ -122,6 +123,7 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
   int ModeOf(int servo, const ServoTime<LocalJet>& time) const {
     return ServoMode(model_, state_, servo, {time.time.a, time.middle, time.h});
   }
+  using internal::LocalEntries<Sink>::SupportAt;
   LocalJet Time() { return locals_.Add(solved_.instant.time, TimeVariable(s_)); }
 
   void Body(int k, const LocalJet mass[3], const LocalJet load[3]) {
@@ -184,6 +186,10 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
 
   void BeginShare(int k) { share_ = k; }
 
+  void Hold(int k, const RowPart<LocalJet>* rows, int count) {
+    this->EmitHeld(locals_, k, rows, count, unknown_, *solved_.solution);
+  }
+
   void Contact(int i, const ActiveContact& contact, const ContactRows<LocalJet>& rows,
                const LocalJet& c_n, const LocalJet& c_t) {
     const int a = contact.a;
@@ -226,21 +232,12 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
   using Base::LocalShapeOfB;
   using Base::model_;
   using Base::RatesByTwist;
+  using Base::RowTimes;
   using Base::s_;
   using Base::scratch_;
   using Base::sink_;
   using Base::state_;
   using Base::x_;
-
-  template <typename T>
-  static T RowTimes(const double* x, int a, const RowPart<T>& row_a, int b,
-                    const RowPart<T>& row_b) {
-    T sum(0.0);
-    for (int i = 0; i < 3; ++i) {
-      sum += row_a[i] * x[3 * a + i] + row_b[i] * x[3 * b + i];
-    }
-    return sum;
-  }
 
   // The rows of joint j, or a share of them, on two bodies.
   void RowsOn(int a, int b, int j, const JointRows<LocalJet>& rows, const LocalJet rhs[3]) {

@@ -47,7 +47,38 @@ class LocalEntries {
         scratch_(*scratch),
         sink_(sink) {}
 
+  /// Of a support, or null.
+  const SupportState* SupportAt(int k) const {
+    return state_.supports.empty() ? nullptr : &state_.supports[k];
+  }
+
  protected:
+  /// row · x of two bodies.
+  template <typename T>
+  static T RowTimes(const double* x, int a, const RowPart<T>& row_a, int b,
+                    const RowPart<T>& row_b) {
+    T sum(0.0);
+    for (int i = 0; i < 3; ++i) {
+      sum += row_a[i] * x[3 * a + i] + row_b[i] * x[3 * b + i];
+    }
+    return sum;
+  }
+
+  /// The rows by which a support holds its body, at the motion of all bodies.
+  void EmitHeld(const Locals& locals, int support, const RowPart<LocalJet>* rows, int count,
+                const double* motion, const ContactSolution<double>& solution) {
+    const int body = s_.supports[support].body;
+    const int joint = static_cast<int>(s_.joints.size()) + support;
+    const RowPart<LocalJet> none{LocalJet(0.0), LocalJet(0.0), LocalJet(0.0)};
+    for (int r = 0; r < count; ++r) {
+      LocalJet speed(0.0);
+      for (int i = 0; i < 3; ++i) speed += rows[r][i] * motion[3 * body + i];
+      Emit(locals, JointRow(joint) + r, speed);
+      EmitMomentum(locals, body, rows[r], s_.world(), none,
+                   -solution.joint_impulse[3 * static_cast<size_t>(joint) + r]);
+    }
+  }
+
   /// The accelerations or displacements of all bodies: the solved ones of moving bodies, the given
   /// accelerations of driven ones, else 0.
   const double* SpreadSolved(const SolvedEquations& solved) {

@@ -89,6 +89,20 @@ void FillServo(const std::optional<BasicServo<T>>& servo, std::vector<T>* number
   if (servo->limit) numbers->push_back(*servo->limit);
 }
 
+// The index of the support of the body that is added next.
+template <typename T>
+void AddSupport(const BasicSupport<T>& support, Places* places, ModelStructure* structure) {
+  SupportIndex& index = structure->supports.emplace_back();
+  index.body = structure->num_bodies();
+  if (!support.points.empty()) {
+    index.kind = SupportIndex::kPoints;
+    index.num_points = static_cast<int>(support.points.size());
+  } else if (support.radius) {
+    index.kind = SupportIndex::kDisc;
+  }
+  index.numbers = places->Take(index.size());
+}
+
 template <typename T>
 void AddBodies(const BasicScene<T>& scene, Places* places, ModelStructure* structure) {
   for (const BasicBody<T>& body : scene.bodies) {
@@ -114,6 +128,7 @@ void AddBodies(const BasicScene<T>& scene, Places* places, ModelStructure* struc
     }
     index.kinetic_friction = body.kinetic_friction ? places->Take(2) : -1;
     structure->friction_decays = structure->friction_decays || body.kinetic_friction;
+    if (body.support) AddSupport(*body.support, places, structure);
     if (body.driven) {
       structure->paths.push_back(
           {structure->num_bodies(), places->Take(kNumPathNumbers), body.driven->path});
@@ -303,6 +318,22 @@ void AppendShape(const BasicShape<T>& shape, std::vector<T>* numbers) {
   }
 }
 
+// Appends the numbers of a body's support. A load that is left out follows the mass, and shares are
+// divided by their sum.
+template <typename T>
+void FillSupport(const BasicSupport<T>& support, const T& mass, std::vector<T>* numbers) {
+  numbers->push_back(support.friction);
+  numbers->push_back(support.load ? *support.load : T(kStandardGravity * mass));
+  T sum(0.0);
+  for (const T& share : support.shares) sum += share;
+  for (size_t i = 0; i < support.points.size(); ++i) {
+    Append(support.points[i], numbers);
+    numbers->push_back(support.shares.empty() ? T(1.0 / static_cast<double>(support.points.size()))
+                                              : T(support.shares[i] / sum));
+  }
+  if (support.points.empty() && support.radius) numbers->push_back(*support.radius);
+}
+
 // Appends the parameters of the bodies, in the order of AddBodies.
 template <typename T>
 void FillBodies(const BasicScene<T>& scene, std::vector<T>* numbers) {
@@ -327,6 +358,7 @@ void FillBodies(const BasicScene<T>& scene, std::vector<T>* numbers) {
       numbers->push_back(*body.kinetic_friction);
       numbers->push_back(body.stribeck_speed);
     }
+    if (body.support) FillSupport(*body.support, body.mass, numbers);
     if (body.driven) {
       numbers->push_back(body.driven->delay);
       numbers->push_back(body.driven->scale);

@@ -144,6 +144,19 @@ struct PathIndex {
   std::shared_ptr<const RecordedPath> path;
 };
 
+/// The friction of a body on the plane of motion: friction and load from `numbers` on, then x, y
+/// and the share of the load (of a sum of 1) of each point, or the radius of a disc (support.h).
+struct SupportIndex {
+  enum Kind : unsigned char { kCentre, kPoints, kDisc };
+  enum Place { kFriction, kLoad, kRadius };  ///< counted from `numbers`
+  int body = -1;
+  Kind kind = kCentre;
+  int numbers = -1;
+  int num_points = 1;  ///< of kCentre 1, without numbers of its own
+  int size() const { return kind == kPoints ? 2 + 3 * num_points : kind == kDisc ? 3 : 2; }
+  int Point(int i) const { return numbers + 2 + 3 * i; }
+};
+
 struct ModelStructure {
   std::string scene_name;
   SimulationSettings settings;
@@ -154,7 +167,8 @@ struct ModelStructure {
   std::vector<ServoIndex> servos;
   std::vector<PairIndex> pairs;
   std::vector<Signal> signals;
-  std::vector<PathIndex> paths;  ///< in ascending order of their bodies
+  std::vector<SupportIndex> supports;  ///< in ascending order of their bodies
+  std::vector<PathIndex> paths;        ///< in ascending order of their bodies
   std::vector<std::pair<std::vector<bool>, std::vector<bool>>> no_contact;
   std::vector<std::pair<int, int>> joined;  ///< bodies with a joint without contact, ascending
   std::vector<int> moving;                  ///< body of each block

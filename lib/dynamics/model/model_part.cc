@@ -68,6 +68,12 @@ class PartTaker {
       TakeOne(&index.angular_damping);
       TakeOne(&index.quadratic_drag);
       TakeNumbers(2, &index.kinetic_friction);
+      for (const SupportIndex& support : whole_.supports) {
+        if (support.body != body) continue;
+        SupportIndex& own = to_->supports.emplace_back(support);
+        own.body = to_->num_bodies() - 1;
+        TakeNumbers(support.size(), &own.numbers);
+      }
       if (const int path = PathOfBody(whole_, body); path >= 0) {
         PathIndex& own = to_->paths.emplace_back(whole_.paths[path]);
         own.body = to_->num_bodies() - 1;

@@ -3,11 +3,21 @@
 //
 // The state of a model: poses and twists of all its bodies, including those that never move.
 
+#include <array>
 #include <vector>
 
 #include "tangible/math/planar.h"
 
 namespace tangible {
+
+/// What the friction of a body on the plane of motion does in a step (elements/support.h).
+struct SupportState {
+  enum Holds : int { kNothing = -2, kBody = -1 };  ///< from 0 on: the point that is held
+  int holds = kNothing;
+  /// The twist of the body about which the friction of the points that slide is linearised.
+  std::array<double, 3> twist{};
+  friend bool operator==(const SupportState&, const SupportState&) = default;
+};
 
 /// Three numbers a body, in the model's order of bodies (the world is the last): (x, y, angle) in m
 /// and rad, (vx, vy, omega) in m/s and rad/s. A static body's pose is a state that nothing changes,
@@ -21,6 +31,8 @@ struct State {
   std::vector<signed char> servo_modes{};
   /// Of each joint whether it has been released (model_releases.h). Empty: none.
   std::vector<char> released{};
+  /// Of each support; empty: supports do not act.
+  std::vector<SupportState> supports{};
 
   Pose<T> PoseOf(int body) const {
     return Pose<T>(Vector2<T>(pose[3 * body], pose[3 * body + 1]), pose[3 * body + 2]);
@@ -40,6 +52,7 @@ State<double> ValuesOf(const State<T>& state) {
   }
   values.servo_modes = state.servo_modes;
   values.released = state.released;
+  values.supports = state.supports;
   return values;
 }
 

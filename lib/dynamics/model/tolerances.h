@@ -37,4 +37,18 @@ inline constexpr double kCorner = 1e-6;
 /// repeated.
 inline constexpr double kSpeedBound = 1e-12;
 
+/// Of m, the squared ratio of the speeds of a disc's centre and rim: nearer to 1 the elliptic
+/// integrals of its support are those at this distance, because they are infinite at 1.
+inline constexpr double kRimCentre = 1e-12;
+/// Of the speed that a body would have without its support: slower points of the body alone are
+/// held; a smoothed dissipation leaves less where 5e-11 of a limit are left.
+inline constexpr double kHeldPoint = 1e-10;
+/// Of the speed that a body would have without its support: where all points are faster the
+/// dissipation is smooth enough for Newton's method without smoothing it.
+inline constexpr double kSlowPoint = 1e-4;
+/// Of the wrench that a support balances: a smaller reserve is none.
+inline constexpr double kLeastReserve = 1e-12;
+/// Of a free body's speed: the length over which the dissipation of points is smoothed at last.
+inline constexpr double kSmoothedSpeed = 1e-15;
+
 }  // namespace tangible

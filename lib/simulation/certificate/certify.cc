@@ -13,6 +13,7 @@
 #include "tangible/simulation/certificate/certify_place_inl.h"
 #include "tangible/simulation/certificate/duality.h"
 #include "tangible/simulation/certificate/feature_ties.h"
+#include "tangible/simulation/certificate/support_slacks.h"
 #include "tangible/simulation/certificate/tolerances.h"
 #include "tangible/simulation/derivatives/rollout_directional.h"
 #include "tangible/simulation/derivatives/tolerances.h"
@@ -29,6 +30,7 @@ constexpr size_t kRankEachStep = 150;
 
 std::string ContactName(const ModelStructure& structure, const ActiveContact& contact) {
   if (contact.is_servo) return NameOfServo(structure, contact);
+  if (contact.is_support) return "support of body " + structure.bodies[contact.a].name;
   if (contact.IsJointFriction()) {
     return (contact.is_motor ? "motor of joint " : "friction in joint ") +
            structure.joints[contact.joint].name;
@@ -230,6 +232,15 @@ void RolloutCertifier::AddFeatures(const Model<double>& model, const StepRecord&
   }
 }
 
+void RolloutCertifier::AddSupports(const Model<double>& model, long step,
+                                   const StepRecord& record) {
+  ForEachSupportSlack(model, record, [&](const SupportSlack& slack) {
+    AddMargin(slack.margin,
+              {model.structure.get(), step, record.time, 0, &slack.contact, ContactMode::kOpen},
+              slack.slides ? "sliding" : "sticking");
+  });
+}
+
 // The mode of a servo is that of its effort at the step's start.
 void RolloutCertifier::AddServos(const Model<double>& model, long step, const StepRecord& record) {
   const ModelStructure& s = *model.structure;
@@ -299,6 +310,7 @@ void RolloutCertifier::AddStep(const Model<double>& model, long step, Stepper* s
   FindDegenerateContacts(record.problem, record.solution, kDegenerateTolerance, &degenerate);
   certificate_.degenerate_rows += static_cast<int>(degenerate.size());
   AddServos(model, step, record);
+  AddSupports(model, step, record);
   AddLinearSystem(record, &stepper->system());
   AddFeatures(model, record, step, &stepper->system());
   last_modes_ = record.solution.modes;

@@ -79,6 +79,7 @@ class RolloutCertifier {
                  AtKink at_kink = AtKink::kNo);
   void AddJump(double margin, const Place& place, const std::string& what);
   void AddServos(const Model<double>& model, long step, const StepRecord& record);
+  void AddSupports(const Model<double>& model, long step, const StepRecord& record);
   void AddDiscreteMap(const Model<double>& model, long step, const StepRecord& record);
   void AddEventStep(const Model<double>& model, long step, Stepper* stepper);
   void AddIsland(const Model<double>& model, long step, EventDerivative* derivative,

@@ -9,6 +9,7 @@
 #include "tangible/simulation/certificate/approach_inl.h"
 #include "tangible/simulation/certificate/certify.h"
 #include "tangible/simulation/certificate/certify_grazing.h"
+#include "tangible/simulation/certificate/support_slacks.h"
 #include "tangible/simulation/certificate/tolerances.h"
 #include "tangible/simulation/events/servo_bounds.h"
 
@@ -28,7 +29,8 @@ ChoiceKey KeyOf(ChoiceKind kind, long when, int detail, const ActiveContact& con
   key.side = (contact.side > 0.0   ? 1
               : contact.side < 0.0 ? 2
                                    : 0) +
-             (contact.is_motor ? 4 : 0) + (contact.is_servo ? 8 : 0);
+             (contact.is_motor ? 4 : 0) + (contact.is_servo ? 8 : 0) +
+             (contact.is_support ? 16 : 0);
   key.feature = static_cast<int>(contact.feature.kind);
   key.feature_a = contact.feature.a;
   key.feature_b = contact.feature.b;
@@ -239,6 +241,11 @@ void ChoiceWatch::AddFixed(const Model<double>& model, long step, Stepper* stepp
   }
   last_contacts_ = record.contacts;
   AddServos(model, step, record);
+  ForEachSupportSlack(model, record, [&](const SupportSlack& slack) {
+    const int detail = 4 * slack.support + 2 + (slack.point + 2) * 65536;
+    Push({KeyOf(ChoiceKind::kMode, step, detail, slack.contact), slack.contact, record.time,
+          slack.slack, slack.scale, true});
+  });
   if (model.structure->has_releases) AddReleases(model, step, record);
 }
 

@@ -102,6 +102,11 @@ template <typename T>
 void AssembleInJets(const Model<T>& model, const StepRecord& record, const State<T>& state,
                     ContactProblem<T>* problem) {
   AssemblyScratch<T> scratch;
+  if (!record.before.supports.empty() && state.supports.empty()) {
+    State<T> with_supports = state;
+    with_supports.supports = record.before.supports;
+    return AssembleInJets(model, record, with_supports, problem);
+  }
   AssembleWithoutContacts(model, state, record.time, record.h, problem, &scratch);
   AssembleContacts(model, state, record.h, record.contacts, record.friction, record.restitution,
                    &scratch, problem);

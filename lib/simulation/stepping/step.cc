@@ -120,7 +120,8 @@ Stepper::Stepper(const Model<double>& model, int threads)
   }
   // Planar packings have at most about three neighbours a body, two points each.
   const int contacts = 6 * shaped + 2 * static_cast<int>(s.joints.size());
-  solver_.Reserve(s.num_blocks(), static_cast<int>(s.joints.size()), contacts);
+  const size_t joints = s.joints.size() + s.supports.size();
+  solver_.Reserve(s.num_blocks(), static_cast<int>(joints), contacts);
   projection_.Reserve(s.num_blocks() + static_cast<int>(s.joints.size()),
                       3 * static_cast<int>(s.joints.size()));
   record_.contacts.reserve(contacts);
@@ -134,11 +135,11 @@ Stepper::Stepper(const Model<double>& model, int threads)
   turning_.reserve(s.num_blocks());
   held_.reserve(contacts);
   record_.problem.dampers.reserve(s.joints.size() + s.springs.size());
-  record_.problem.joints.reserve(s.joints.size());
+  record_.problem.joints.reserve(joints);
   for (ContactSolution<double>* solution :
        {&record_.solution, &last_solution_, &narrow_solution_}) {
     solution->motion.reserve(3 * s.num_blocks());
-    solution->joint_impulse.reserve(3 * s.joints.size());
+    solution->joint_impulse.reserve(3 * joints);
     solution->normal_impulse.reserve(contacts);
     solution->tangent_impulse.reserve(contacts);
     solution->modes.reserve(contacts);
@@ -217,14 +218,14 @@ ContactMode Stepper::InitialMode(const ContactBlock<double>& contact) const {
   return tangent > 0.0 ? ContactMode::kSlidingPositive : ContactMode::kSlidingNegative;
 }
 
-void Stepper::CarryGuess(const Model<double>& model, const std::vector<ActiveContact>& contacts,
+void Stepper::CarryGuess(const std::vector<ActiveContact>& contacts,
                          const ContactSolution<double>& solution, Guess from_where) {
   ContactSolution<double>& guess = record_.solution;
   const size_t n = record_.contacts.size();
   guess.modes.resize(n);
   guess.normal_impulse.assign(n, 0.0);
   guess.tangent_impulse.assign(n, 0.0);
-  guess.joint_impulse.assign(3 * model.structure->joints.size(), 0.0);
+  guess.joint_impulse.assign(3 * record_.problem.joints.size(), 0.0);
   if (solution.joint_impulse.size() == guess.joint_impulse.size()) {
     guess.joint_impulse.assign(solution.joint_impulse.begin(), solution.joint_impulse.end());
   }
@@ -266,7 +267,8 @@ void Stepper::Describe(const Model<double>& model, int contact, StepReport* repo
   if (contact < 0) {
     const int joint =
         MostViolatedJoint(record_.problem, record_.solution.motion, record_.solution.motion, 0.0);
-    report->message = joint < 0 ? "momentum"
+    const bool of_joint = joint >= 0 && joint < static_cast<int>(s.joints.size());
+    report->message = !of_joint ? "momentum"
                                 : "the joints' equations, most of all of joint " +
                                       s.joints[joint].name + " (are they contradictory?)";
   }
@@ -286,7 +288,7 @@ void Stepper::FillReport(const Model<double>& model, const ContactSolverReport& 
   report->angles_left_out = CountAnglesLeftOut(turning_);
   if (!solved.solved) {
     report->status = StepStatus::kUnsolved;
-    Describe(model, solved.worst_contact, report);
+    if (report->message.empty()) Describe(model, solved.worst_contact, report);
     std::ostringstream residual;
     if (std::isfinite(solved.residual)) {
       residual << " (scaled residual " << solved.residual << ")";
@@ -400,11 +402,11 @@ ContactSolverReport Stepper::SolveWithContacts(const Model<double>& model,
   for (int search = 0; search < kMaxSearches; ++search) {
     AssembleContacts(model, state, h, r.contacts, r.friction, r.restitution, &scratch_, &r.problem);
     if (search == 0) {
-      CarryGuess(model, last_contacts_, last_solution_, Guess::kLastStep);
+      CarryGuess(last_contacts_, last_solution_, Guess::kLastStep);
     } else {
       // The guess is the solution with fewer contacts, with the additional ones open: often that is
       // the solution.
-      CarryGuess(model, wider_contacts_, narrow_solution_, Guess::kSameStep);
+      CarryGuess(wider_contacts_, narrow_solution_, Guess::kSameStep);
     }
     const auto solve = [&] {
       const ContactSolverReport earlier = solved;
@@ -420,7 +422,7 @@ ContactSolverReport Stepper::SolveWithContacts(const Model<double>& model,
       ++report->given_up.rebounds_given_up;
       AssembleContacts(model, state, h, r.contacts, r.friction, r.restitution, &scratch_,
                        &r.problem);
-      CarryGuess(model, last_contacts_, last_solution_, Guess::kLastStep);
+      CarryGuess(last_contacts_, last_solution_, Guess::kLastStep);
       solve();
     }
     if (!solved.solved) {
@@ -444,6 +446,32 @@ ContactSolverReport Stepper::SolveWithContacts(const Model<double>& model,
   return solved;
 }
 
+ContactSolverReport Stepper::SolveWithSupports(const Model<double>& model,
+                                               const State<double>& state, double h,
+                                               StepReport* report) {
+  if (model.structure->supports.empty()) return SolveWithContacts(model, state, h, report);
+  StepRecord& r = record_;
+  supports_.Start(model, h, r.problem, &r.before);
+  for (;;) {
+    AssembleWithoutContacts(model, r.before, r.time, h, &r.problem, &scratch_);
+    ContactSolverReport solved = SolveWithContacts(model, state, h, report);
+    if (!solved.solved && !supports_.has_given_up() && supports_.Release(&r.before)) continue;
+    if (!solved.solved) return solved;
+    if (supports_.Accept(model, r, &r.before)) {
+      SupportIteration::KeepAtRest(*model.structure, &r);
+      return solved;
+    }
+    if (supports_.has_given_up()) {
+      solved.solved = false;
+      solved.residual = supports_.residual();
+      report->message = "the support of body " +
+                        model.structure->bodies[supports_.worst_body()].name +
+                        ": its friction does not settle";
+      return solved;
+    }
+  }
+}
+
 StepReport Stepper::Step(const Model<double>& model, double t, double h, State<double>* state) {
   CheckInterrupt();
   if (events_) {
@@ -460,13 +488,14 @@ StepReport Stepper::Step(const Model<double>& model, double t, double h, State<d
   r.before.released.assign(state->released.begin(), state->released.end());
   r.before.pose.assign(state->pose.begin(), state->pose.end());
   r.before.twist.assign(state->twist.begin(), state->twist.end());
-  AssembleWithoutContacts(model, *state, t, h, &r.problem, &scratch_);
+  r.before.supports.clear();
+  AssembleWithoutContacts(model, r.before, t, h, &r.problem, &scratch_);
   if (!AllFinite(r.problem.load) || !AllFinite(r.problem.mass)) {
     report.status = StepStatus::kDiverged;
     report.message = "a force or momentum is not finite";
     return report;
   }
-  FillReport(model, SolveWithContacts(model, *state, h, &report), &report);
+  FillReport(model, SolveWithSupports(model, *state, h, &report), &report);
   if (report.status != StepStatus::kDone) {
     return report;
   }

@@ -26,6 +26,7 @@
 #include "tangible/simulation/islands/island_jets.h"
 #include "tangible/simulation/islands/island_step.h"
 #include "tangible/simulation/stepping/joint_projection.h"
+#include "tangible/simulation/stepping/support_iteration.h"
 
 namespace tangible {
 
@@ -121,12 +122,15 @@ class Stepper {
   enum class Guess { kLastStep, kSameStep };
   // Sets the modes and impulses from which this problem's solution is sought: those of `solution`
   // for the contacts that both have.
-  void CarryGuess(const Model<double>& model, const std::vector<ActiveContact>& contacts,
+  void CarryGuess(const std::vector<ActiveContact>& contacts,
                   const ContactSolution<double>& solution, Guess from_where);
   ContactSolverReport SolveContacts(const ContactSolverOptions& options, int* islands);
   // Finds the contacts that the step may close and solves with them; again with more contacts where
   // bodies turn out faster than was assumed.
   ContactSolverReport SolveWithContacts(const Model<double>& model, const State<double>& state,
+                                        double h, StepReport* report);
+  // The same for a scene with supports, again until their friction is that of the new twists.
+  ContactSolverReport SolveWithSupports(const Model<double>& model, const State<double>& state,
                                         double h, StepReport* report);
   ContactMode InitialMode(const ContactBlock<double>& contact) const;
   void FillReport(const Model<double>& model, const ContactSolverReport& solved,
@@ -143,6 +147,7 @@ class Stepper {
   SolveDerivative solve_derivative_;
   ContactProblem<double> refactored_;  ///< memory of the problem that is assembled anew
   ContactSearch search_;
+  SupportIteration supports_;
   ContactSolver solver_;
   std::unique_ptr<IslandSolver> islands_;
   bool factored_ = true;  ///< whether solver_.system() is that of record_

@@ -20,7 +20,7 @@ Scene ManyKinds() {
        "friction": 0.4},
       {"name": "a", "shape": {"box": {"size": [0.1, 1]}}, "mass": 2, "position": [0, -0.5],
        "velocity": [0.3, -0.2], "angular_velocity": 0.3, "friction": 0.2, "restitution": 0.5,
-       "quadratic_drag": 0.03},
+       "quadratic_drag": 0.03, "support": {"friction": 0.1, "points": [[0, 0.1], [0, -0.2]]}},
       {"name": "p", "shape": {"circle": {"radius": 0.2}}, "mass": 1.5, "position": [9, 1],
        "angular_velocity": 2, "linear_damping": 0.1, "angular_damping": 0.05},
       {"name": "b", "shape": {"polygon": {"vertices": [[-0.1, -0.1], [0.2, -0.1], [-0.1, 0.2]]}},

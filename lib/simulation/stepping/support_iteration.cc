@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/simulation/stepping/support_iteration.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "tangible/simulation/stepping/tolerances.h"
+
+namespace tangible {
+namespace {
+
+// The linearised friction of a point, per unit of its limit.
+void LinearisedFriction(const double about[2], const double velocity[2], double friction[2]) {
+  const double speed = std::hypot(about[0], about[1]);
+  friction[0] = friction[1] = 0.0;
+  if (!(speed > 0.0)) return;
+  const double d[2] = {about[0] / speed, about[1] / speed};
+  const double across = (d[0] * velocity[1] - d[1] * velocity[0]) / speed;
+  friction[0] = -d[0] + d[1] * across;
+  friction[1] = -d[1] - d[0] * across;
+}
+
+}  // namespace
+
+void SupportIteration::Start(const Model<double>& model, double h,
+                             const ContactProblem<double>& problem, State<double>* before) {
+  const ModelStructure& s = *model.structure;
+  h_ = h;
+  iterations_ = 0;
+  residual_ = HUGE_VAL;
+  before->supports.resize(s.supports.size());
+  residuals_.resize(s.supports.size());
+  turns_.assign(s.supports.size(), 0);
+  for (size_t k = 0; k < s.supports.size(); ++k) {
+    const size_t row = 3 * static_cast<size_t>(s.bodies[s.supports[k].body].block);
+    friction_.Set(model, *before, s.supports[k], h);
+    before->supports[k] = friction_.SolveAlone(&problem.mass[row], &problem.load[row]);
+  }
+}
+
+// The impulse that the linearised support gives its body in a solve; `held`: of its rows.
+void SupportIteration::ImpulseOf(const SupportState& at, const double twist[3], const double* held,
+                                 double impulse[3]) const {
+  std::fill_n(impulse, 3, 0.0);
+  if (at.holds == SupportState::kBody) {
+    std::copy_n(held, 3, impulse);
+    return;
+  }
+  if (friction_.is_disc()) {
+    double curvature[9];
+    friction_.At(at.twist.data(), impulse);
+    friction_.Curvature(at.twist.data(), curvature);
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) impulse[i] -= curvature[3 * i + j] * (twist[j] - at.twist[j]);
+    }
+    return;
+  }
+  for (size_t i = 0; i < friction_.points().size(); ++i) {
+    const SupportPoint& point = friction_.points()[i];
+    double f[2] = {0.0, 0.0};
+    if (static_cast<int>(i) == at.holds) {
+      std::copy_n(held, 2, f);
+    } else {
+      double about[2], velocity[2];
+      point.VelocityAt(at.twist.data(), about);
+      point.VelocityAt(twist, velocity);
+      LinearisedFriction(about, velocity, f);
+      for (double& component : f) component *= point.limit;
+    }
+    impulse[0] += f[0];
+    impulse[1] += f[1];
+    impulse[2] += point.arm[0] * f[1] - point.arm[1] * f[0];
+  }
+}
+
+// How far the support is from Coulomb's law at the new twist, of μ N.
+double SupportIteration::ResidualOf(const SupportState& at, const double mass[3],
+                                    const double twist[3], const double* held) const {
+  const double limit = friction_.limit();
+  if (!(limit > 0.0)) return 0.0;
+  const double slow = kStandingPoint * limit / mass[0];
+  const double arm = friction_.arm();
+  // How far an impulse goes beyond what the support can hold, by the motion it would give.
+  const auto beyond = [&](const double impulse[3]) {
+    if (friction_.CanHold(impulse)) return 0.0;
+    const double unit[3] = {1.0, 1.0, arm > 0.0 ? arm * arm : 1.0};
+    const SupportState alone = friction_.SolveAlone(unit, impulse);
+    return std::hypot(alone.twist[0], alone.twist[1], arm * alone.twist[2]) / limit;
+  };
+  if (at.holds == SupportState::kBody) {
+    const double impulse[3] = {-held[0], -held[1], -held[2]};
+    return beyond(impulse);
+  }
+  if (friction_.is_disc()) {
+    double impulse[3], law[3];
+    ImpulseOf(at, twist, held, impulse);
+    if (std::hypot(twist[0], twist[1], arm * twist[2]) <= slow) return beyond(impulse);
+    friction_.At(twist, law);
+    return std::hypot(impulse[0] - law[0], impulse[1] - law[1], (impulse[2] - law[2]) / arm) /
+           limit;
+  }
+  double residual = 0.0;
+  for (size_t i = 0; i < friction_.points().size(); ++i) {
+    const SupportPoint& point = friction_.points()[i];
+    if (static_cast<int>(i) == at.holds) {
+      double held_limit = 0.0;  // points at the same place are held together
+      for (const SupportPoint& other : friction_.points()) {
+        const bool same = other.arm[0] == point.arm[0] && other.arm[1] == point.arm[1];
+        held_limit += same ? other.limit : 0.0;
+      }
+      residual = std::max(residual, (std::hypot(held[0], held[1]) - held_limit) / limit);
+      continue;
+    }
+    double about[2], velocity[2], f[2];
+    point.VelocityAt(at.twist.data(), about);
+    point.VelocityAt(twist, velocity);
+    LinearisedFriction(about, velocity, f);
+    const double speed = std::hypot(velocity[0], velocity[1]);
+    const double error = speed <= slow
+                             ? std::hypot(f[0], f[1]) - 1.0
+                             : std::hypot(f[0] + velocity[0] / speed, f[1] + velocity[1] / speed);
+    residual = std::max(residual, error * point.limit / limit);
+  }
+  return residual;
+}
+
+void SupportIteration::Linearise(const double mass[3], const double twist[3], const double* held,
+                                 int* turns, SupportState* at) const {
+  // Held as a whole after so many turns, and again after as many.
+  constexpr int kHeldAfter = 3;
+  double impulse[3], momentum[3];
+  ImpulseOf(*at, twist, held, impulse);
+  for (int i = 0; i < 3; ++i) momentum[i] = mass[i] * twist[i] - impulse[i];
+  if (at->holds == SupportState::kNothing && at->twist == SupportState().twist &&
+      std::hypot(twist[0], twist[1], twist[2]) > 0.0) {
+    std::copy_n(twist, 3, at->twist.begin());  // it has been let go
+    return;
+  }
+  const SupportState alone = friction_.SolveAlone(mass, momentum);
+  bool turns_round = alone.holds != at->holds;
+  if (friction_.is_disc()) {
+    const double* u = at->twist.data();
+    turns_round =
+        turns_round ||
+        !(mass[0] * (u[0] * twist[0] + u[1] * twist[1]) + mass[2] * u[2] * twist[2] > 0.0);
+  }
+  for (size_t i = 0; i < friction_.points().size(); ++i) {
+    double about[2], velocity[2];
+    friction_.points()[i].VelocityAt(at->twist.data(), about);
+    friction_.points()[i].VelocityAt(twist, velocity);
+    turns_round = turns_round || (static_cast<int>(i) != at->holds &&
+                                  !(about[0] * velocity[0] + about[1] * velocity[1] > 0.0));
+  }
+  if (turns_round && ++*turns % kHeldAfter == 0) {
+    const bool has_parts = friction_.is_disc() || friction_.points().size() > 1;
+    *at = SupportState{has_parts ? static_cast<int>(SupportState::kBody) : 0, {}};
+  } else if (turns_round) {
+    *at = alone;
+  } else {
+    std::copy_n(twist, 3, at->twist.begin());
+  }
+}
+
+void SupportIteration::KeepAtRest(const ModelStructure& structure, StepRecord* record) {
+  for (size_t k = 0; k < structure.supports.size(); ++k) {
+    const SupportIndex& support = structure.supports[k];
+    const int holds = record->before.supports[k].holds;
+    const bool holds_centre = support.kind == SupportIndex::kCentre && holds == 0;
+    const std::ptrdiff_t components = holds == SupportState::kBody ? 3 : holds_centre ? 2 : 0;
+    std::fill_n(record->new_twist.begin() + 3 * support.body, components, 0.0);
+    std::fill_n(record->solution.motion.begin() + 3 * structure.bodies[support.body].block,
+                components, 0.0);
+  }
+}
+
+bool SupportIteration::Release(State<double>* before) {
+  bool any = false;
+  for (SupportState& at : before->supports) {
+    if (at.holds == SupportState::kNothing) continue;
+    at = SupportState();
+    any = true;
+  }
+  ++iterations_;
+  residual_ = HUGE_VAL;
+  return any;
+}
+
+bool SupportIteration::Accept(const Model<double>& model, const StepRecord& record,
+                              State<double>* before) {
+  const ModelStructure& s = *model.structure;
+  const double last = residual_;
+  const auto visit = [&](const auto& of_support) {
+    for (size_t k = 0; k < s.supports.size(); ++k) {
+      const int body = s.supports[k].body;
+      friction_.Set(model, *before, s.supports[k], h_);
+      of_support(k, &record.problem.mass[3 * static_cast<size_t>(s.bodies[body].block)],
+                 &record.new_twist[3 * static_cast<size_t>(body)],
+                 &record.solution.joint_impulse[3 * (s.joints.size() + k)]);
+    }
+  };
+  residual_ = 0.0;
+  visit([&](size_t k, const double* mass, const double* twist, const double* held) {
+    residuals_[k] = ResidualOf(before->supports[k], mass, twist, held);
+    if (residuals_[k] < residual_) return;
+    residual_ = residuals_[k];
+    worst_body_ = s.supports[k].body;
+  });
+  if (residual_ <= kSupportSettled) return true;
+  if (residual_ <= s.settings.lcp_tolerance && residual_ > 0.5 * last) return true;
+  ++iterations_;
+  visit([&](size_t k, const double* mass, const double* twist, const double* held) {
+    if (residuals_[k] > kSupportSettled)
+      Linearise(mass, twist, held, &turns_[k], &before->supports[k]);
+  });
+  return false;
+}
+
+}  // namespace tangible
