@@ -28,6 +28,7 @@
 //   Along(a, row_a, b, row_b, push, damping)  load += rowᵀ (push − damping · speed)
 //   Decay(a, row_a, b, row_b, numbers)        load += rowᵀ FrictionDecay(numbers, speed)
 //   Joint(j, rows, rhs)                       row · x = rhs − prescribed speed
+//   Hold(support, rows, count)                row · x = 0 of its body
 //   Share(j, k, rows, rhs)                    coordinate k's share of a coupling's row; builders
 //                                             that keep joints receive the whole row
 //   BeginShare(k)                             the contact that follows is one such share
