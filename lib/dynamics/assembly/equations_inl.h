@@ -32,7 +32,6 @@
 //   Share(j, k, rows, rhs)                    coordinate k's share of a coupling's row; builders
 //                                             that keep joints receive the whole row
 //   BeginShare(k)                             the contact that follows is one such share
-//   Hold(support, rows, count)                row · x = 0 of its body
 //   Contact(i, contact, rows, c_n, c_t)       n · x + c_n, t · x + c_t
 
 #include "tangible/dynamics/assembly/assembly.h"
