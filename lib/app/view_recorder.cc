@@ -32,6 +32,7 @@ ViewJoint MakeJoint(const Model<double>& model, const JointIndex& joint) {
   }
   if (joint.type == JointType::kRope && joint.high >= 0) view.rope = model.parameters[joint.high];
   view.has_motor = joint.motor >= 0;
+  if (joint.until >= 0) view.until = model.parameters[joint.until];
   return view;
 }
 

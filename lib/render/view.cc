@@ -197,6 +197,10 @@ void WriteLinks(const ViewData& data, JsonWriter* json) {
       json->Key("servo");
       json->Number(1.0);
     }
+    if (joint.until) {
+      json->Key("until");
+      json->Number(*joint.until);
+    }
     json->Close('}');
   }
   json->Close(']');

@@ -9,6 +9,7 @@
 // module does not depend on dynamics.
 
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -37,6 +38,7 @@ struct ViewJoint {
   double rope = 0.0;  ///< m, the greatest distance of a rope's ends; 0: no bound
   bool has_motor = false;
   bool has_servo = false;
+  std::optional<double> until;  ///< s, from which it is not drawn
 };
 
 /// A spring; anchors as in ViewJoint.

@@ -216,7 +216,6 @@ function drawContactPoints(g, body, pose) {
   g.fillStyle = bodyColour(body);
   for (const point of body.points || []) { disc(g, toScreen(toWorld(pose, point)), 3); g.fill(); }
 }
-// The line, with strokes of equal distance on the side of the solid.
 // Where a body stands on the plane of motion: a cross at each point, or the outline of a disc.
 function drawSupport(g, body, pose) {
   g.strokeStyle = bodyColour(body); g.lineWidth = 1.2;
@@ -229,7 +228,7 @@ function drawSupport(g, body, pose) {
   disc(g, toScreen([pose[0], pose[1]]), body.support_radius * camera.scale); g.stroke();
   g.setLineDash([]);
 }
-
+// The line, with strokes of equal distance on the side of the solid.
 function drawPolyline(g, body, pose) {
   const points = body.core.points.map((p) => toScreen(toWorld(pose, p)));
   if (body.closed) points.push(points[0]);
@@ -292,6 +291,7 @@ function drawServo(g, p) {
   }
 }
 function drawJoint(g, joint, k) {
+  if (view.time[k] >= joint.until) return;
   const ends = linkEnds(joint, k);
   if (!ends) return;
   const [a, b] = ends.points;

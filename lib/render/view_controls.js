@@ -123,6 +123,16 @@ function legend() {
   if (view.joints.some((joint) => joint.servo)) {
     add("servo", (g) => { g.strokeStyle = colours.text; drawServo(g, [15, 10]); });
   }
+  if (view.bodies.some((body) => body.support_radius)) {
+    add("stands on this disc", (g) => {
+      g.strokeStyle = colours.text; g.lineWidth = 1.2; g.setLineDash([2, 3]); disc(g, [15, 9], 7); g.stroke();
+    });
+  }
+  if (view.bodies.some((body) => body.support && body.support.length)) {
+    add("stands on this point", (g) => {
+      g.strokeStyle = colours.text; g.lineWidth = 1.2; line(g, [11, 5], [19, 13]); line(g, [11, 13], [19, 5]);
+    });
+  }
   if (view.springs.length) {
     add("spring", (g) => {
       g.strokeStyle = colours.series[5]; g.lineWidth = 1.6; g.beginPath(); g.moveTo(1, 9);

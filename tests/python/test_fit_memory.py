@@ -244,3 +244,55 @@ def test_pandas_is_never_imported() -> None:
         "assert not {'pandas', 'matplotlib', 'torch'} & set(sys.modules)"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+@pytest.mark.parametrize("form", ["wide", "long"])
+def test_forces_of_joints_and_contacts_are_data(form: str) -> None:
+    """A block slides on the floor with mu m g; a mass hangs from a pin with its weight."""
+    held: dict[str, Any] = {
+        "bodies": [
+            {"name": "block", "shape": {"box": {"size": [0.4, 0.2]}}, "mass": 2.0, "position": [0, 0.1],
+             "velocity": [3, 0]},
+            {"name": "floor", "static": True, "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}},
+            {"name": "bob", "mass": 1.0, "inertia": 0.1, "position": [9, 5]}],
+        "pairs": [{"bodies": ["block", "floor"], "friction": 0.3}],
+        "joints": [{"name": "pin", "type": "weld", "bodies": ["bob", "world"], "anchor": [9, 5]}],
+        "simulation": {"dt": 0.01, "duration": 0.2, "stepping": "event"}}
+    times = np.linspace(0.02, 0.2, 10)
+    contact = {"normal": np.full(10, 2.0 * 9.81), "tangent": np.full(10, -0.4 * 2.0 * 9.81)}
+    joint = {"fy": np.full(10, 1.5 * 9.81)}
+    tables: list[dict[str, Any]] = [
+        {"time": times, **{f"block:floor/{key}": values for key, values in contact.items()}},
+        {"time": times, "pin/fy": joint["fy"]}]
+    if form == "long":
+        tables = [{"time": times, "contact": ["block:floor"] * 10, **contact},
+                  {"time": times, "joint": ["pin"] * 10, **joint}]
+    found = tangible.fit({
+        "scene": held, "parameters": ["pairs/block:floor/friction", "bodies/bob/mass"],
+        "observations": [{"data": table, "sigma": 0.1} for table in tables]})
+    assert found["pairs/block:floor/friction"] == pytest.approx(0.4, abs=1e-9)
+    assert found["bodies/bob/mass"] == pytest.approx(1.5, abs=1e-9)
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("Agg")
+    assert "N" in found.plot().get_ylabel()
+
+
+def test_times_of_events_are_data() -> None:
+    """Bounces of a ball at 0.8 of each speed, of which the drop's height is known."""
+    first = float(np.sqrt(2.0 * 0.9 / 9.81))
+    times = first + np.cumsum(np.concatenate([[0.0], 2.0 * first * 0.8 ** np.arange(1, 5)]))
+    drop = {
+        "bodies": [
+            {"name": "ball", "shape": {"circle": {"radius": 0.1}}, "mass": 1.0, "position": [0, 1.0]},
+            {"name": "floor", "static": True, "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
+        "pairs": [{"bodies": ["ball", "floor"], "friction": 0.0, "restitution": 0.7}],
+        "simulation": {"dt": 0.01, "duration": 3.0, "stepping": "event"}}
+    table = {"time": times, "event": ["bounce"] * 5, "number": np.arange(1, 6)}
+    problem = {
+        "scene": drop, "parameters": ["pairs/ball:floor/restitution"],
+        "events": {"bounce": {"bodies": ["ball", "floor"], "kind": "touch"}},
+        "observations": [{"data": table, "sigma": 1e-3}]}
+    assert tangible.fit(problem)["pairs/ball:floor/restitution"] == pytest.approx(0.8, abs=1e-8)
+    with pytest.raises(ValueError, match="number: expected 1, 2"):
+        table["number"] = [1, None, 3, 4, 5]
+        tangible.fit(problem)

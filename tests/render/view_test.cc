@@ -106,6 +106,13 @@ TEST(ViewHtml, DataIsWhatWasGiven) {
   EXPECT_EQ(data["contacts"][3][0], nlohmann::json::array({1, 0, 0, 0, 0, 1, 5, 0, 1}));
 }
 
+TEST(ViewHtml, AJointThatEndsSaysWhen) {
+  ViewData view = MakeView(2, -1);
+  EXPECT_FALSE(DataOf(ViewHtml(view))["joints"][0].contains("until"));
+  view.joints[0].until = 0.25;
+  EXPECT_EQ(DataOf(ViewHtml(view))["joints"][0]["until"], 0.25);
+}
+
 TEST(ViewHtml, EllipsesAndContactPointsAreGiven) {
   ViewData view = MakeView(2, -1);
   view.bodies[1].shape = {ShapeType::kEllipse, {0.5, 0.25}};

@@ -331,7 +331,11 @@ class FitResult:
         return f"FitResult({self.status}, {values})"
 
 
-_UNITS = {"x": "m", "y": "m", "angle": "rad", "vx": "m/s", "vy": "m/s", "omega": "rad/s", "distance": "m"}
+_UNITS = {
+    **{"x": "m", "y": "m", "distance": "m", "angle": "rad", "vx": "m/s", "vy": "m/s", "omega": "rad/s"},
+    **{"ax": "m/s²", "ay": "m/s²", "alpha": "rad/s²", "time": "s"},
+    **{"fx": "N", "fy": "N", "normal": "N", "tangent": "N", "torque": "N m"},
+}
 
 
 def _read_predictions(text: str) -> dict[str, NDArray[Any]]:

@@ -19,7 +19,8 @@ from ._plain import plain
 from ._scene import Scene
 
 # Columns of an observation file that are no measured coordinate.
-_KEYS = ("time", "body", "point", "relative_to")
+_OWNERS = ("body", "point", "joint", "contact")
+_KEYS = ("time", *_OWNERS, "relative_to", "event", "number")
 
 Core = TypeVar("Core")
 
@@ -177,7 +178,7 @@ def _columns(table: Any, where: str) -> dict[str, NDArray[Any]]:
             columns[key] = np.full(rows, column)
         elif column.shape != (rows,):
             raise ValueError(f"{where}: {key}: expected shape {(rows,)}, as time, got {column.shape}")
-        if key not in _KEYS[1:] and column.dtype.kind not in "fiu":
+        if key not in (*_OWNERS, "relative_to", "event") and column.dtype.kind not in "fiu":
             try:
                 columns[key] = np.array([np.nan if x is None else x for x in column], dtype=np.float64)
             except (TypeError, ValueError):
@@ -199,17 +200,34 @@ def _text(owner: str, names: Sequence[Any], columns: Mapping[str, NDArray[Any]],
     return "\n".join(rows) + "\n"
 
 
+def _events(columns: Mapping[str, NDArray[Any]], where: str) -> str:
+    """A file of the times of events."""
+    expected = ("time", "event", "number")
+    if set(columns) != set(expected):
+        raise ValueError(f"{where}: expected the columns {', '.join(expected)}, got {', '.join(columns)}")
+    if not np.isfinite(columns["number"]).all():
+        raise ValueError(f"{where}: number: expected 1, 2, ... for the first, second, ... event of its name")
+    rows = [
+        f"{float(time):.17g},{event},{int(number)}"
+        for time, event, number in zip(*(columns[key] for key in expected))
+    ]
+    return "\n".join([",".join(expected), *rows]) + "\n"
+
+
 def observation_files(table: Any, scene: Scene | None, points: Sequence[str], where: str) -> list[str]:
     """The text of observation files that hold a table.
 
-    Long tables have a column `body` or `point` that names what a row is of; wide ones columns like
-    "ball/x"; a table of one moving body needs neither.
+    Long tables have a column `body`, `point`, `joint` or `contact` that names what a row is of; wide
+    ones columns like "ball/x", "pin/fx" or "ball:floor/normal"; a table of one moving body needs
+    neither. A table of events has the columns `time`, `event` and `number`.
     """
     columns = _columns(table, where)
     wide = [key for key in columns if "/" in key]
     if not wide:
+        if "event" in columns:
+            return [_events(columns, where)]
         also = [key for key in ("relative_to",) if key in columns]
-        for owner in ("body", "point"):
+        for owner in _OWNERS:
             if owner in columns:
                 return [_text(owner, list(columns[owner]), columns, also)]
         moving = [
@@ -218,7 +236,7 @@ def observation_files(table: Any, scene: Scene | None, points: Sequence[str], wh
         ]
         if len(moving) != 1:
             raise ValueError(
-                f"{where}: expected a column body or point, or columns like ball/x, of a scene with "
+                f"{where}: expected a column {', '.join(_OWNERS)} or event, or columns like ball/x, of a scene with "
                 f"{len(moving)} moving bodies, got {', '.join(columns)}"
             )
         return [_text("body", moving * len(columns["time"]), columns, also)]
@@ -230,6 +248,8 @@ def observation_files(table: Any, scene: Scene | None, points: Sequence[str], wh
     for owner in owners:
         own = {key.rpartition("/")[2]: columns[key] for key in wide if key.rpartition("/")[0] == owner}
         kind = "point" if owner in points else "body"
+        if kind == "body" and scene is not None and owner not in scene.bodies:
+            kind = "joint" if owner in scene.joints else "contact" if ":" in owner else kind
         texts.append(_text(kind, [owner] * len(columns["time"]), {"time": columns["time"], **own}, []))
     return texts
 
