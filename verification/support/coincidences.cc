@@ -23,6 +23,8 @@ constexpr long double kWay = 1e-6L;
 // The size of a parameter that is 0: where a coincidence moves with the square of the way (that of
 // the speed at the top of a fall), the square must exceed the rounding of the scene's numbers.
 constexpr long double kSizeOfZero = 1.0L;
+// At most that of a coordinate, m: how far from the origin an element stands says nothing of it.
+constexpr long double kSizeOfPlace = 10.0L;
 // Between two elements, m.
 constexpr double kApart = 100.0;
 // Of the output: what is left after the derivative over that way is a jump.
@@ -39,7 +41,10 @@ std::vector<Real> Outputs(const Coincidence& coincidence, const Map& numbers) {
 VectorX<double> Side(const Coincidence& coincidence, const Map& at, const std::vector<Real>& values,
                      const std::string& path, long double sign) {
   const Real value = at.at(path);
-  const long double size = value.value != 0.0L ? std::abs(value.value) : kSizeOfZero;
+  const bool is_place = path.find("/position/") != std::string::npos;
+  const long double size = value.value == 0.0L ? kSizeOfZero
+                           : is_place          ? std::min(std::abs(value.value), kSizeOfPlace)
+                                               : std::abs(value.value);
   const long double way = sign * kWay * size;
   constexpr long double kPoints[3] = {1.0L, 0.5L, 0.25L};
   constexpr long double kWeights[3] = {1.0L / 3.0L, -2.0L, 8.0L / 3.0L};

@@ -278,10 +278,14 @@ void SceneMaker::Couplings() {
     BasicJoint<double>& added = scene_.joints.back();
     if (!in_tree(first) || !in_tree(first + 1) || random.Chance(0.4) ||
         !CoupledRatesFault(scene_, "").empty()) {
-      added.limits = {random.Chance(0.2) ? 0.0 : -random.Uniform(0.001, 0.02),
-                      random.Chance(0.2) ? 0.0 : random.Uniform(0.001, 0.02)};
+      // It may begin at one of them.
+      const double low = random.Chance(0.2) ? 0.0 : -random.Uniform(0.001, 0.02);
+      const double high = low < 0.0 && random.Chance(0.2) ? 0.0 : random.Uniform(0.001, 0.02);
+      added.limits = {low, high};
       if (random.Chance(0.5)) added.limit_restitution = random.Uniform(0.0, 1.0);
     }
+    // Limits, which not all joints may have that can be kept.
+    if (!EndsOf(scene_, added).fault.empty()) scene_.joints.pop_back();
     ++first;
   }
 }
@@ -303,6 +307,12 @@ void SceneMaker::Supports() {
   RandomNumbers random(0x73757070ULL + 0x9e3779b97f4a7c15ULL * seed_);
   for (BasicBody<double>& body : scene_.bodies) {
     if (body.motion != Motion::kMoving || !random.Chance(0.6)) continue;
+    // Not of a mechanism, where a step whose friction does not settle is not rare.
+    const int place = static_cast<int>(&body - scene_.bodies.data());
+    const bool has_joint = std::any_of(
+        scene_.joints.begin(), scene_.joints.end(),
+        [&](const auto& joint) { return joint.bodies[0] == place || joint.bodies[1] == place; });
+    if (has_joint) continue;
     BasicSupport<double>& support = body.support.emplace();
     // Gravity lies in the plane: from a body that it drags along to one that it cannot move.
     support.friction = std::pow(10.0, random.Uniform(-2.0, 0.3));
