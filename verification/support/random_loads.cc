@@ -278,9 +278,10 @@ void SceneMaker::Couplings() {
     BasicJoint<double>& added = scene_.joints.back();
     if (!in_tree(first) || !in_tree(first + 1) || random.Chance(0.4) ||
         !CoupledRatesFault(scene_, "").empty()) {
-      // It may begin at one of them.
-      const double low = random.Chance(0.2) ? 0.0 : -random.Uniform(0.001, 0.02);
-      const double high = low < 0.0 && random.Chance(0.2) ? 0.0 : random.Uniform(0.001, 0.02);
+      // It may begin at one of them, but in a loop, whose other joints may leave it no way.
+      const double at_one = in_tree(first) && in_tree(first + 1) ? 0.2 : 0.0;
+      const double low = random.Chance(at_one) ? 0.0 : -random.Uniform(0.001, 0.02);
+      const double high = low < 0.0 && random.Chance(at_one) ? 0.0 : random.Uniform(0.001, 0.02);
       added.limits = {low, high};
       if (random.Chance(0.5)) added.limit_restitution = random.Uniform(0.0, 1.0);
     }
