@@ -190,12 +190,19 @@ if(TANGIBLE_SANITIZE)
   target_compile_options(tangible_test_flags INTERFACE -fno-sanitize=null,alignment)
 endif()
 
-# tangible_test_program(<name> [NO_PRECOMPILE] SOURCES file... LINK target... [LABELS label...]): a program of tests,
-# without entries of ctest. NO_PRECOMPILE: what it links brings compiler options of its own.
-function(tangible_test_program name)
-  cmake_parse_arguments(TEST "NO_PRECOMPILE" "" "SOURCES;LINK;LABELS" ${ARGN})
+# tangible_test(<name> [NO_PRECOMPILE] [BY_FILE prefix] SOURCES file... LINK target... [LABELS label...]
+#               [TIMEOUT seconds]): a program of tests. The tests of a folder are one program, but for those that are
+# labelled otherwise or count allocations, and one entry of ctest; BY_FILE: an entry for each file, <prefix>_<file>, for
+# files that take long, which then run beside each other although they are compiled at once. NO_PRECOMPILE: what it
+# links brings compiler options of its own.
+function(tangible_test name)
+  cmake_parse_arguments(TEST "NO_PRECOMPILE" "BY_FILE;TIMEOUT" "SOURCES;LINK;LABELS" ${ARGN})
   add_executable(${name} ${TEST_SOURCES})
-  target_link_libraries(${name} PRIVATE tangible_flags tangible_test_flags ${TEST_LINK})
+  if(TEST_BY_FILE)
+    target_sources(${name} PRIVATE "${PROJECT_SOURCE_DIR}/tests/support/main_by_file.cc")
+  endif()
+  target_link_libraries(${name} PRIVATE tangible_flags tangible_test_flags ${TEST_LINK}
+                                        GTest::$<IF:$<BOOL:${TEST_BY_FILE}>,gtest,gtest_main>)
   tangible_unite(${name})
   if(TANGIBLE_PRECOMPILE_HEADERS AND NOT TEST_NO_PRECOMPILE)
     target_precompile_headers(${name} REUSE_FROM tangible_precompiled_tests)
@@ -205,45 +212,21 @@ function(tangible_test_program name)
   endif()
   target_compile_definitions(${name} PRIVATE TANGIBLE_SOURCE_DIR="${PROJECT_SOURCE_DIR}"
                              TANGIBLE_PROGRAM_DIR="${PROJECT_BINARY_DIR}/bin")
-endfunction()
-
-# tangible_test(<name> [NO_PRECOMPILE] SOURCES file... LINK target... [LABELS label...] [TIMEOUT seconds]): one
-# test program, one ctest entry. The tests of a folder are one program, but for those that are labelled otherwise
-# or count allocations.
-function(tangible_test name)
-  cmake_parse_arguments(TEST "NO_PRECOMPILE" "TIMEOUT" "SOURCES;LINK;LABELS" ${ARGN})
-  set(precompile)
-  if(TEST_NO_PRECOMPILE)
-    set(precompile NO_PRECOMPILE)
-  endif()
-  tangible_test_program(${name} ${precompile} SOURCES ${TEST_SOURCES} LINK ${TEST_LINK} GTest::gtest_main
-                        LABELS ${TEST_LABELS})
-  add_test(NAME ${name} COMMAND ${name})
   if(NOT TEST_TIMEOUT)
     set(TEST_TIMEOUT 300)
   endif()
-  set_tests_properties(${name} PROPERTIES LABELS "${TEST_LABELS}" TIMEOUT ${TEST_TIMEOUT})
-endfunction()
-
-# tangible_tests_by_file(<name> [NO_PRECOMPILE] PREFIX prefix SOURCES file... LINK target... LABELS label...
-#                        [TIMEOUT seconds]): one test program, and an entry of ctest for each file, <prefix>_<file>: for files that take long, which then run beside
-# each other although they are compiled at once.
-function(tangible_tests_by_file name)
-  cmake_parse_arguments(TEST "NO_PRECOMPILE" "PREFIX;TIMEOUT" "SOURCES;LINK;LABELS" ${ARGN})
-  set(precompile)
-  if(TEST_NO_PRECOMPILE)
-    set(precompile NO_PRECOMPILE)
+  set(entries)
+  if(TEST_BY_FILE)
+    foreach(source IN LISTS TEST_SOURCES)
+      get_filename_component(stem "${source}" NAME_WE)
+      add_test(NAME ${TEST_BY_FILE}_${stem} COMMAND ${name} --file=${stem}.cc)
+      list(APPEND entries ${TEST_BY_FILE}_${stem})
+    endforeach()
+  else()
+    add_test(NAME ${name} COMMAND ${name})
+    set(entries ${name})
   endif()
-  tangible_test_program(${name} ${precompile} SOURCES ${TEST_SOURCES} "${PROJECT_SOURCE_DIR}/tests/support/main_by_file.cc"
-                        LINK ${TEST_LINK} GTest::gtest LABELS ${TEST_LABELS})
-  if(NOT TEST_TIMEOUT)
-    set(TEST_TIMEOUT 300)
-  endif()
-  foreach(source IN LISTS TEST_SOURCES)
-    get_filename_component(stem "${source}" NAME_WE)
-    add_test(NAME ${TEST_PREFIX}_${stem} COMMAND ${name} --file=${stem}.cc)
-    set_tests_properties(${TEST_PREFIX}_${stem} PROPERTIES LABELS "${TEST_LABELS}" TIMEOUT ${TEST_TIMEOUT})
-  endforeach()
+  set_tests_properties(${entries} PROPERTIES LABELS "${TEST_LABELS}" TIMEOUT ${TEST_TIMEOUT})
 endfunction()
 
 # tangible_benchmark(<name> SOURCES file... LINK target...): a Google Benchmark program, not a test.
