@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "tangible/estimation/problem/tolerances.h"
 
@@ -54,19 +55,29 @@ ForceRows::ForceRows(const std::vector<Observation>& observations, const std::ve
     row.state = by_events ? k : row.read_at - 1;
     last_step_ = std::max(last_step_, row.read_at);
   }
+  order_.resize(rows_.size());
+  std::iota(order_.begin(), order_.end(), 0);
+  std::stable_sort(order_.begin(), order_.end(),
+                   [&](int a, int b) { return rows_[a].read_at < rows_[b].read_at; });
 }
 
-bool ForceRows::ReadsAt(long k) const {
-  return std::any_of(rows_.begin(), rows_.end(), [k](const Row& row) { return row.read_at == k; });
+std::span<const int> ForceRows::ReadAt(long k) const {
+  const auto first = std::partition_point(order_.begin(), order_.end(),
+                                          [&](int row) { return rows_[row].read_at < k; });
+  const auto last =
+      std::find_if(first, order_.end(), [&](int row) { return rows_[row].read_at != k; });
+  return {first, last};
 }
 
 void ForceRows::Add(long k, const Model<double>& model, Stepper* stepper) {
-  if (stepper == nullptr || !ReadsAt(k)) return;
+  const std::span<const int> rows = ReadAt(k);
+  if (stepper == nullptr || rows.empty()) return;
   for (const ForceInstant instant : {ForceInstant::kStart, ForceInstant::kEnd}) {
     std::vector<ConstraintForce> forces;
     std::vector<Row*> read;
-    for (Row& row : rows_) {
-      if (row.read_at != k || row.instant != instant) continue;
+    for (const int place : rows) {
+      Row& row = rows_[place];
+      if (row.instant != instant) continue;
       forces.push_back(row.force_of);
       read.push_back(&row);
     }

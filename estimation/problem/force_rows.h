@@ -9,6 +9,7 @@
 // is that of the motion up to there, a function of the state at t. At the start of the run it is
 // that of the first step. step_forces.h has the equations.
 
+#include <span>
 #include <vector>
 
 #include "tangible/estimation/problem/observation.h"
@@ -44,8 +45,7 @@ class ForceRows {
   template <typename Before, typename After, typename Set>
   void ForEachDot(long k, Eigen::Index columns, const Before& before, const After& after,
                   const Set& set) const {
-    for (int row = 0; row < num_rows(); ++row) {
-      if (rows_[row].read_at != k) continue;
+    for (const int row : ReadAt(k)) {
       Eigen::RowVectorXd dot = Eigen::RowVectorXd::Zero(columns);
       for (const JacobianEntry& entry : rows_[row].force.by_variables) {
         if (rows_[row].state < k) {
@@ -57,8 +57,8 @@ class ForceRows {
       set(row, dot);
     }
   }
-  /// Whether rows are read when the state after k steps is known.
-  bool ReadsAt(long k) const;
+  /// The rows that are read when the state after k steps is known.
+  std::span<const int> ReadAt(long k) const;
 
  private:
   struct Row {
@@ -71,6 +71,7 @@ class ForceRows {
 
   std::vector<Row> rows_;
   std::vector<int> row_of_;
+  std::vector<int> order_;  ///< of the rows, by the step after which they are read
   long last_step_ = 0;
   StepForces forces_;
 };

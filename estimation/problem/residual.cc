@@ -340,7 +340,7 @@ bool RolloutResiduals::Tangent(RowMatrixXd* jacobian) {
         [&](int row, const Eigen::RowVectorXd& dot) {
           sample_derivatives.row(ForceRow(row)) = dot;
         });
-    if (forces_.ReadsAt(k + 1)) last_dots = dots;
+    if (!forces_.ReadAt(k + 1).empty()) last_dots = dots;
     plan_.Add(k, state, &samples_, &rates_);
     plan_.numbers().AddTangent(k, *scene_.model().structure, dots, &sample_derivatives);
     event_times_.Add(k, k == 0 ? nullptr : &stepper);

@@ -8,9 +8,9 @@
 namespace tangible {
 
 void RolloutResiduals::AddForces(long k, Stepper* stepper) {
-  if (stepper == nullptr || !forces_.ReadsAt(k)) return;
+  if (stepper == nullptr) return;
   forces_.Add(k, scene_.model(), stepper);
-  for (int row = 0; row < forces_.num_rows(); ++row) {
+  for (const int row : forces_.ReadAt(k)) {
     samples_[static_cast<size_t>(ForceRow(row))] = forces_.Value(row);
   }
 }

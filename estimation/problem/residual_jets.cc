@@ -36,7 +36,7 @@ bool RolloutResiduals::JetPass(int first, JetRoute route, RowMatrixXd* sample_de
         k, N, dot_of(last), dot_of(state), [&](int row, const Eigen::RowVectorXd& dot) {
           sample_derivatives->row(ForceRow(row)).segment(first, used) = dot.head(used);
         });
-    if (forces_.ReadsAt(k + 1)) last = state;
+    if (!forces_.ReadAt(k + 1).empty()) last = state;
   };
   long fallbacks = 0;
   if (!Accept(RolloutJets(model, initial, route, observer, &final, &fallbacks))) return false;
