@@ -14,8 +14,8 @@ namespace tangible {
 namespace {
 
 bool IsOfPair(const ActiveContact& contact, const ObservedEvent& event) {
-  return contact.joint < 0 && ((contact.a == event.bodies[0] && contact.b == event.bodies[1]) ||
-                               (contact.a == event.bodies[1] && contact.b == event.bodies[0]));
+  return contact.IsOfShapes() && ((contact.a == event.bodies[0] && contact.b == event.bodies[1]) ||
+                                  (contact.a == event.bodies[1] && contact.b == event.bodies[0]));
 }
 
 bool IsInIsland(const IslandRecord& island, const ObservedEvent& event) {

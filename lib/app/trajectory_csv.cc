@@ -60,9 +60,11 @@ void ContactsCsv::Add(const ModelStructure& structure, double t, const StepRecor
   const std::string time = FormatNumber(t);
   for (size_t i = 0; i < record.contacts.size(); ++i) {
     const ActiveContact& contact = record.contacts[i];
-    const bool is_friction = contact.IsJointFriction();  // which has no normal impulse
+    const bool is_friction = contact.IsPureFriction();  // which has no normal impulse
     const std::string names =
-        contact.is_motor     ? ",motor," + structure.joints[contact.joint].name + ",,"
+        contact.is_rolling ? ",rolling," + structure.bodies[contact.a].name + "," +
+                                 structure.bodies[contact.b].name + ","
+        : contact.is_motor   ? ",motor," + structure.joints[contact.joint].name + ",,"
         : is_friction        ? ",friction," + structure.joints[contact.joint].name + ",,"
         : contact.joint >= 0 ? ",limit," + structure.joints[contact.joint].name +
                                    (contact.side > 0.0 ? ",low," : ",high,")

@@ -88,7 +88,7 @@ void ViewRecorder::AddContacts(const Model<double>& model, const StepRecord& rec
                                ViewFrame* frame) const {
   for (size_t i = 0; i < record.contacts.size(); ++i) {
     const ActiveContact& contact = record.contacts[i];
-    if (contact.joint >= 0 || record.solution.modes[i] == ContactMode::kOpen) {
+    if (!contact.IsOfShapes() || record.solution.modes[i] == ContactMode::kOpen) {
       continue;
     }
     ContactRows<double> rows;

@@ -132,7 +132,7 @@ void EngineStep::FindImpacts() {
     std::vector<Meeting> kind;
     for (size_t c = 0; c < impulses.contacts.size(); ++c) {
       const ActiveContact contact = island.InWhole(impulses.contacts[c]);
-      if (contact.IsJointFriction() || impulses.solution.normal_impulse[c] <= 0.0) continue;
+      if (contact.IsPureFriction() || impulses.solution.normal_impulse[c] <= 0.0) continue;
       kind.push_back({contact.a, contact.b, contact.joint});
     }
     // The decompression belongs to the same impact as the compression.

@@ -72,7 +72,7 @@ void AddContacts(double t, double length, const Stepper& stepper, Table* table) 
   const StepRecord& record = stepper.record();
   for (size_t i = 0; i < record.contacts.size(); ++i) {
     const ActiveContact& contact = record.contacts[i];
-    if (contact.joint >= 0) continue;
+    if (!contact.IsOfShapes()) continue;
     table->time.push_back(t);
     table->length.push_back(length);
     table->first.push_back(contact.a);

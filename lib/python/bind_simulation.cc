@@ -103,7 +103,7 @@ class Simulation {
       for (size_t c = 0; c < record.contacts.size(); ++c) {
         const double impulse = record.solution.normal_impulse[c];
         const ActiveContact& contact = record.contacts[c];
-        if (contact.joint < 0 && impulse > 0.0)
+        if (contact.IsOfShapes() && impulse > 0.0)
           touches[i].emplace_back(contact.a, contact.b, impulse);
       }
     }

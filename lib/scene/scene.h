@@ -84,11 +84,12 @@ struct BasicBody {
   T friction{0.0};  ///< Coulomb coefficient, ≥ 0
   /// Of Stribeck's decay, ≥ 0: the coefficient far above `stribeck_speed`. None: it does not decay.
   std::optional<T> kinetic_friction;
-  T stribeck_speed{1.0};            ///< m/s, > 0; only with a kinetic friction
-  T restitution{0.0};               ///< in [0, 1]
-  T linear_damping{0.0};            ///< N s/m, ≥ 0: force −c v
-  T angular_damping{0.0};           ///< N m s, ≥ 0
-  std::optional<T> quadratic_drag;  ///< N s²/m², ≥ 0: force −c |v| v
+  T stribeck_speed{1.0};              ///< m/s, > 0; only with a kinetic friction
+  std::optional<T> rolling_friction;  ///< m, ≥ 0: |torque| ≤ ρ λn at each contact; none: 0
+  T restitution{0.0};                 ///< in [0, 1]
+  T linear_damping{0.0};              ///< N s/m, ≥ 0: force −c v
+  T angular_damping{0.0};             ///< N m s, ≥ 0
+  std::optional<T> quadratic_drag;    ///< N s²/m², ≥ 0: force −c |v| v
   std::optional<BasicSupport<T>> support;
 };
 
@@ -213,6 +214,7 @@ struct BasicPair {
   std::optional<T> restitution;
   std::optional<T> kinetic_friction;  ///< as of a body
   T stribeck_speed{1.0};
+  std::optional<T> rolling_friction;  ///< m
 };
 
 enum class Stepping { kFixed, kEvent };

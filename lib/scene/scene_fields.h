@@ -119,13 +119,15 @@ inline int NumNumbers(ShapeType type) {
   return 0;
 }
 
-/// Friction that decays with the speed, of a body or pair.
+/// Friction that decays with the speed, and rolling friction, of a body or pair.
 template <typename Item, typename Visitor>
-void VisitFrictionDecay(Item& item, Visitor* visitor) {
+void VisitFurtherFriction(Item& item, Visitor* visitor) {
   visitor->Optional({"kinetic_friction", NumberKind::kNonNegative}, item.kinetic_friction);
   visitor->Number({"stribeck_speed", NumberKind::kPositive, Dimension::kVelocity, true, true,
                    "kinetic_friction", item.kinetic_friction.has_value()},
                   item.stribeck_speed);
+  visitor->Optional({"rolling_friction", NumberKind::kNonNegative, Dimension::kLength},
+                    item.rolling_friction);
 }
 
 /// The recorded path of a kinematic body.
@@ -191,7 +193,7 @@ void VisitBody(Body& body, Visitor* visitor) {
                   body.angular_damping);
   visitor->Optional({"quadratic_drag", kNonNegative, Dimension::kQuadraticDrag, false, moves},
                     body.quadratic_drag);
-  VisitFrictionDecay(body, visitor);
+  VisitFurtherFriction(body, visitor);
   VisitSupport(body, visitor);
 }
 
@@ -306,7 +308,7 @@ template <typename Pair, typename Visitor>
 void VisitPair(Pair& pair, Visitor* visitor) {
   visitor->Optional({"friction", NumberKind::kNonNegative}, pair.friction);
   visitor->Optional({"restitution", NumberKind::kFraction}, pair.restitution);
-  VisitFrictionDecay(pair, visitor);
+  VisitFurtherFriction(pair, visitor);
 }
 
 template <typename Settings, typename Visitor>

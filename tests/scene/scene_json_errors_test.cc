@@ -76,9 +76,11 @@ TEST(BadSceneTest, Bodies) {
        "friction, "
        "restitution, "
        "linear_damping, angular_damping, quadratic_drag, kinetic_friction, stribeck_speed, "
-       "support, got \"masss\""},
+       "rolling_friction, support, got \"masss\""},
       {"/bodies/0/kinetic_friction", "0.1",
        "/bodies/0/stribeck_speed: missing, expected a number > 0"},
+      {"/bodies/0/rolling_friction", "-1",
+       "/bodies/0/rolling_friction: expected a number >= 0, got -1"},
       {"/bodies/0/stribeck_speed", "0.1",
        "/bodies/0/kinetic_friction: missing, expected a number >= 0 with stribeck_speed"},
       {"/bodies/0/mass", "-1", "/bodies/0/mass: expected a number > 0, got -1"},
@@ -544,7 +546,7 @@ TEST(BadSceneTest, PairsAndNoContact) {
       {"/pairs/0/restitution", "2", "/pairs/0/restitution: expected a number in [0, 1], got 2"},
       {"/pairs/0/name", "\"p\"",
        "/pairs/0/name: unknown key of a pair, expected one of bodies, friction, restitution, "
-       "kinetic_friction, stribeck_speed, got \"name\""},
+       "kinetic_friction, stribeck_speed, rolling_friction, got \"name\""},
       {"/no_contact/0", R"(["ball", "nobody"])",
        "/no_contact/0/1: expected a name or pattern of a body (" + bodies + "), got \"nobody\""},
       {"/no_contact/0", R"("ball")",

@@ -104,6 +104,7 @@ Coverage CoverageOf(const Scene& scene, const RunTrace& run) {
     if (body.kinetic_friction) {
       coverage["friction of a body that decays"] = 1;
     }
+    if (body.rolling_friction) coverage["rolling friction of a body"] = 1;
   }
   coverage["bodies " + std::to_string(moving)] = 1;
   const SimulationSettings& settings = scene.simulation;

@@ -301,6 +301,15 @@ void SceneMaker::Ends() {
   }
 }
 
+void SceneMaker::RollingFriction() {
+  if (seed_ % 4 != 3) return;
+  RandomNumbers random(0x726f6c6cULL + 0x9e3779b97f4a7c15ULL * seed_);
+  for (BasicBody<double>& body : scene_.bodies) {
+    if (body.shape.type == ShapeType::kNone || random.Chance(0.4)) continue;
+    body.rolling_friction = 0.3 * std::pow(10.0, random.Uniform(-4.0, -1.0));
+  }
+}
+
 void SceneMaker::Supports() {
   if (seed_ % 4 != 2 || options_.stepping == Stepping::kEvent) {
     return;

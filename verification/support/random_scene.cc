@@ -83,6 +83,7 @@ Scene SceneMaker::Make() {
   Couplings();
   Ends();
   Supports();
+  RollingFriction();
   return scene_;
 }
 

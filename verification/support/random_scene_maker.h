@@ -79,6 +79,8 @@ class SceneMaker {
   void Ends();
   /// Friction of bodies on the plane of motion in every fourth scene of fixed steps, likewise.
   void Supports();
+  /// Rolling friction of contacts in every fourth scene, likewise.
+  void RollingFriction();
   /// A servo whose coordinate starts at `at`.
   BasicServo<double> Servo(double at, RandomNumbers* random);
 

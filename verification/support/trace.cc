@@ -115,7 +115,7 @@ ActiveContact TouchOf(const Segment& segment, const EventPart* next) {
     return std::any_of(contacts.begin(), contacts.end(),
                        [&](const ActiveContact& c) { return c.SameAs(contact); });
   };
-  if (segment.event != EventKind::kTouch || touch.joint >= 0 || next == nullptr ||
+  if (segment.event != EventKind::kTouch || !touch.IsOfShapes() || next == nullptr ||
       !next->is_impulses || !has(next->impulses.contacts, touch)) {
     return touch;
   }
@@ -126,7 +126,7 @@ ActiveContact TouchOf(const Segment& segment, const EventPart* next) {
   ActiveContact first = touch;
   for (size_t i = 0; i < impact.contacts.size(); ++i) {
     const ActiveContact& other = impact.contacts[i];
-    if (other.joint < 0 && other.a == touch.a && other.b == touch.b &&
+    if (other.IsOfShapes() && other.a == touch.a && other.b == touch.b &&
         impact.solution.modes[i] != ContactMode::kOpen && !has(segment.contacts, other) &&
         key(other) < key(first)) {
       first = other;
@@ -191,7 +191,7 @@ std::string Describe(const RunTrace& run, const ContactTrace& trace) {
            ContactName(*run.structure, trace.contact);
   }
   std::string text = ContactName(*run.structure, trace.contact) + " " + ModeName(trace.mode);
-  if (trace.contact.joint < 0) {
+  if (trace.contact.IsOfShapes()) {
     text += " (law " + std::string(kLaws[static_cast<int>(trace.contact.law)]) + ", feature " +
             std::to_string(static_cast<int>(trace.contact.feature.kind)) + ":" +
             std::to_string(trace.contact.feature.a) + ":" +

@@ -116,8 +116,11 @@ class ProblemBuilder {
     friction_ = &friction;
     restitution_ = restitution;
     p_.contacts.clear();
+    p_.has_rolling = false;
     p_.contacts.reserve(contacts.size());
     for (size_t i = 0; i < contacts.size(); ++i) {
+      // In a list without its contact the friction has no load.
+      rolls_ = i > 0 && contacts[i - 1].RollsBy(contacts[i]);
       equations_.Contact(static_cast<int>(i), contacts[i]);
     }
   }
@@ -240,7 +243,7 @@ class ProblemBuilder {
     block.friction = EvaluateCoefficient((*friction_)[i], model_.parameters);
     block.has_friction = (*friction_)[i].value > 0.0;
     if constexpr (kLevel == Level::kAcceleration) {
-      if (contact.joint < 0 && block.has_friction) LetFrictionDecay(contact, rows, &block);
+      if (contact.IsOfShapes() && block.has_friction) LetFrictionDecay(contact, rows, &block);
     }
     block.c_n = c_n;
     block.c_t = c_t;
@@ -248,11 +251,16 @@ class ProblemBuilder {
       block.limit_given = block.driven = true;
       block.offset = T(equations_.Weight());
     }
+    if (contact.is_rolling) {
+      block.limit_given = block.driven = true;
+      block.rolls = rolls_;
+      p_.has_rolling = p_.has_rolling || rolls_;
+    }
     if constexpr (kLevel == Level::kVelocity) {
       block.c_n += PrescribedSpeed(s_, state_, contact.a, rows.normal_a, contact.b, rows.normal_b);
       block.c_t +=
           PrescribedSpeed(s_, state_, contact.a, rows.tangent_a, contact.b, rows.tangent_b);
-      if (contact.law == ContactLaw::kGap && contact.joint < 0) {
+      if (contact.law == ContactLaw::kGap && contact.IsOfShapes()) {
         block.rounding = PositionRounding(state_, contact.a, contact.b) / at_.h;
       }
     } else if (IsDriven()) {
@@ -306,6 +314,7 @@ class ProblemBuilder {
   ContactProblem<T>& p_;
   const std::vector<CoefficientSource>* friction_ = nullptr;
   const std::vector<CoefficientSource>* restitution_ = nullptr;
+  bool rolls_ = false;
   Equations<kLevel, ProblemBuilder> equations_;
 };
 

@@ -242,6 +242,23 @@ void ContactSearch::FindContacts(const Model<double>& model, const State<double>
   }
 }
 
+void ContactSearch::AddRolling(const Model<double>& model, std::vector<ActiveContact>* contacts,
+                               std::vector<CoefficientSource>* friction,
+                               std::vector<CoefficientSource>* restitution) {
+  without_rolling_.swap(*contacts);
+  contacts->clear();
+  friction->clear();
+  restitution->clear();
+  for (const ActiveContact& contact : without_rolling_) {
+    contacts->push_back(contact);
+    AppendRolling(model, contacts);
+  }
+  for (const ActiveContact& contact : *contacts) {
+    friction->push_back(FrictionOf(model, contact));
+    restitution->push_back(RestitutionOf(model, contact));
+  }
+}
+
 void ContactSearch::Find(const Model<double>& model, const State<double>& state, double h,
                          const AssemblyScratch<double>& scratch,
                          std::vector<ActiveContact>* contacts,
@@ -272,6 +289,7 @@ void ContactSearch::Find(const Model<double>& model, const State<double>& state,
     friction->resize(contacts->size(), MixedFriction(model, contact.a, contact.b));
     restitution->resize(contacts->size(), MixedRestitution(model, contact.a, contact.b));
   }
+  if (model.structure->has_rolling_friction) AddRolling(model, contacts, friction, restitution);
   FindLimits(model, state, h, scratch, contacts);
   friction->resize(contacts->size());
   for (size_t i = restitution->size(); i < contacts->size(); ++i) {

@@ -61,10 +61,16 @@ class ContactSearch {
   void FindLimits(const Model<double>& model, const State<double>& state, double h,
                   const AssemblyScratch<double>& scratch, std::vector<ActiveContact>* contacts);
 
+  // Inserts rolling friction after the contacts that have it.
+  void AddRolling(const Model<double>& model, std::vector<ActiveContact>* contacts,
+                  std::vector<CoefficientSource>* friction,
+                  std::vector<CoefficientSource>* restitution);
+
   Lengths lengths_;
   std::vector<double> bound_;          ///< m/s a body
   std::vector<ActiveContact> limits_;  ///< of all joints
-  std::vector<double> limit_bound_;    ///< a joint: bound on its coordinate's rate, rad/s or m/s
+  std::vector<ActiveContact> without_rolling_;
+  std::vector<double> limit_bound_;  ///< a joint: bound on its coordinate's rate, rad/s or m/s
   std::vector<Aabb> boxes_;
   std::vector<std::pair<int, int>> pairs_;
   std::vector<double> free_twist_;

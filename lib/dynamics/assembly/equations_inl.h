@@ -247,7 +247,9 @@ class Equations {
     b_.Begin();
     ContactRows<T> rows;
     ContactRates<T> rates;
-    if (contact.joint >= 0) {
+    if (contact.is_rolling) {
+      SetRollingRows(&rows);
+    } else if (contact.joint >= 0) {
       Limit(contact, &rows, &rates);
     } else if constexpr (kLevel == Level::kAcceleration) {
       const MovingPose<T> a = b_.Moving(contact.a);

@@ -40,12 +40,53 @@ CoefficientSource MixedFriction(const Model<double>& model, int a, int b) {
 }
 
 CoefficientSource FrictionOf(const Model<double>& model, const ActiveContact& contact) {
+  if (contact.is_rolling) {
+    CoefficientSource rolling;
+    MixedRolling(model, contact.a, contact.b, &rolling);
+    return rolling;
+  }
   if (contact.joint < 0) {
     return MixedFriction(model, contact.a, contact.b);
   }
   const JointIndex& joint = model.structure->joints[contact.joint];
   if (contact.is_motor) return OwnCoefficient(model, joint.motor + 1);
   return contact.IsJointFriction() ? OwnCoefficient(model, joint.friction) : CoefficientSource();
+}
+
+bool MixedRolling(const Model<double>& model, int a, int b, CoefficientSource* rolling) {
+  const ModelStructure& structure = *model.structure;
+  if (!structure.has_rolling_friction) return false;
+  const PairIndex* pair = structure.FindPair(a, b);
+  if (pair != nullptr && pair->rolling_friction >= 0) {
+    *rolling = OwnCoefficient(model, pair->rolling_friction);
+    return true;
+  }
+  const int of_a = structure.bodies[a].rolling_friction;
+  const int of_b = structure.bodies[b].rolling_friction;
+  if (of_a < 0 && of_b < 0) return false;
+  if (of_a >= 0 && of_b >= 0) {
+    *rolling = MixedCoefficient(model, of_a, of_b, structure.settings.friction_mixing);
+    return true;
+  }
+  if (structure.settings.friction_mixing != Mixing::kAverage) return false;
+  *rolling = OwnCoefficient(model, std::max(of_a, of_b));
+  rolling->derivatives[0] = 0.5;
+  rolling->value *= 0.5;
+  return true;
+}
+
+bool AppendRolling(const Model<double>& model, std::vector<ActiveContact>* contacts) {
+  CoefficientSource rolling;
+  if (contacts->empty() || !contacts->back().IsOfShapes() ||
+      !MixedRolling(model, contacts->back().a, contacts->back().b, &rolling)) {
+    return false;
+  }
+  ActiveContact friction = contacts->back();
+  friction.is_rolling = true;
+  friction.law = ContactLaw::kInelastic;
+  friction.gap = 0.0;
+  contacts->push_back(friction);
+  return true;
 }
 
 void AppendLimits(const Model<double>& model, const State<double>& state,
@@ -82,6 +123,7 @@ void AppendJointFriction(const Model<double>& model, const State<double>& state,
 }
 
 CoefficientSource RestitutionOf(const Model<double>& model, const ActiveContact& contact) {
+  if (contact.is_rolling) return CoefficientSource();
   if (contact.joint < 0) return MixedRestitution(model, contact.a, contact.b);
   const int restitution = model.structure->joints[contact.joint].limit_restitution;
   return restitution < 0 || contact.IsJointFriction() ? CoefficientSource()

@@ -17,7 +17,9 @@
 // friction, its gap the coordinate's distance from the limit. Dry friction in a joint is a contact
 // without a normal row that is always closed: its tangent row is that of the coordinate, and the
 // force or torque at which it slides takes the place of μ (contact_problem.h). A motor is friction
-// about the speed that it keeps.
+// about the speed that it keeps. Rolling friction of a contact is one too: its tangent row is the
+// relative angular velocity, and ρ λn of the contact, which stands before it in all lists, takes
+// the place of the force at which it slides.
 //
 // The law is a discrete choice that is made in double, and the derivative is that of the chosen
 // law. The map from states to states jumps between kGap and kRestitution; the margins say how near
@@ -44,24 +46,36 @@ struct ActiveContact {
   bool is_motor = false;
   bool is_servo = false;    ///< names the event of a servo, of a joint or on body a; no contact
   bool is_support = false;  ///< names the support of body a; no contact
+  /// Rolling friction of the contact before it in the list, whose feature it has.
+  bool is_rolling = false;
   ContactLaw law = ContactLaw::kGap;
   double gap = 0.0;  ///< m (rad for the limit of an angle), at the step's start
   bool IsJointFriction() const { return joint >= 0 && side == 0.0; }
+  /// Friction without a normal row of its own.
+  bool IsPureFriction() const { return is_rolling || IsJointFriction(); }
+  /// A contact of two shapes.
+  bool IsOfShapes() const { return joint < 0 && !is_rolling; }
+  /// Whether `next` is the rolling friction of this contact.
+  bool RollsBy(const ActiveContact& next) const {
+    return next.is_rolling && !is_rolling && joint < 0 && a == next.a && b == next.b &&
+           feature == next.feature;
+  }
   /// Whether both contacts are between the same bodies, as those at the two ends of a face, or of
   /// the same joint.
   bool IsBetweenTheSame(const ActiveContact& other) const {
-    return a == other.a && b == other.b && joint == other.joint && is_motor == other.is_motor;
+    return a == other.a && b == other.b && joint == other.joint && is_motor == other.is_motor &&
+           is_rolling == other.is_rolling;
   }
   /// Whether both contacts are between the same two shapes.
   bool IsOfTheSameShapes(const ActiveContact& other) const {
-    return joint < 0 && other.joint < 0 && a == other.a && b == other.b &&
+    return IsOfShapes() && other.IsOfShapes() && a == other.a && b == other.b &&
            feature.part_a == other.feature.part_a && feature.part_b == other.feature.part_b;
   }
   PartPair Parts() const { return {feature.part_a, feature.part_b}; }
   /// Whether contacts of two steps are the same.
   bool SameAs(const ActiveContact& other) const {
     return a == other.a && b == other.b && feature == other.feature && joint == other.joint &&
-           side == other.side && is_motor == other.is_motor;
+           side == other.side && is_motor == other.is_motor && is_rolling == other.is_rolling;
   }
 };
 
@@ -177,6 +191,11 @@ bool MixedDecay(const Model<T>& model, int a, int b, DecaySource* decay) {
 /// the derivative is 0).
 CoefficientSource MixedFriction(const Model<double>& model, int a, int b);
 CoefficientSource MixedRestitution(const Model<double>& model, int a, int b);
+/// Their rolling friction, m, mixed by the rule of friction, where a body without it has 0; false
+/// where neither has it, and where the geometric mean is 0 because one of them has none.
+bool MixedRolling(const Model<double>& model, int a, int b, CoefficientSource* rolling);
+/// Appends to a list the rolling friction of its last contact, if that has it; whether it did.
+bool AppendRolling(const Model<double>& model, std::vector<ActiveContact>* contacts);
 /// The restitution of any active contact: mixed between shapes, or that of a joint's limits;
 /// friction has none.
 CoefficientSource RestitutionOf(const Model<double>& model, const ActiveContact& contact);
@@ -288,6 +307,17 @@ void EvaluateContactRows(const Model<T>& model, const Pose<T>& pose_a, const Pos
   RowsFromGeometry(shape_a.type, pose_a.position, shape_b.type, pose_b.position, rows);
 }
 
+/// The rows of rolling friction: ω_a − ω_b.
+template <typename T>
+void SetRollingRows(ContactRows<T>* rows) {
+  const RowPart<T> none{T(0.0), T(0.0), T(0.0)};
+  rows->geometry.gap = T(0.0);
+  rows->geometry.normal = rows->geometry.point = Vector2<T>(T(0.0), T(0.0));
+  rows->normal_a = rows->normal_b = none;
+  rows->tangent_a = {T(0.0), T(0.0), T(1.0)};
+  rows->tangent_b = {T(0.0), T(0.0), T(-1.0)};
+}
+
 /// The same at a state, with the poses of all bodies.
 template <typename T>
 void EvaluateContactRows(const Model<T>& model, const State<T>& state, const ActiveContact& contact,
@@ -331,6 +361,7 @@ inline int LimitNumber(const JointIndex& joint, const ActiveContact& contact) {
 template <typename T>
 void EvaluateActiveRows(const Model<T>& model, const State<T>& state, const ActiveContact& contact,
                         ContactRows<T>* rows) {
+  if (contact.is_rolling) return SetRollingRows(rows);
   if (contact.joint < 0) {
     EvaluateContactRows(model, state, contact, rows);
     return;

@@ -8,7 +8,7 @@ namespace tangible {
 bool AreOfOneSeam(const Model<double>& model, const ActiveContact& x,
                   const ContactGeometry<double>& of_x, const ActiveContact& y,
                   const ContactGeometry<double>& of_y) {
-  if (x.joint >= 0 || y.joint >= 0 || (x.a == y.a && x.b == y.b)) {
+  if (!x.IsOfShapes() || !y.IsOfShapes() || (x.a == y.a && x.b == y.b)) {
     return false;
   }
   const bool first_of_x = model.SeamsOf(x.a, x.feature.part_a) != nullptr;

@@ -29,6 +29,11 @@ class GradientVisitor : private internal::LocalEntries<EntryListSink> {
 
   void Slip(const ActiveContact& contact) {
     Locals locals;
+    if (contact.is_rolling) {
+      ContactRows<LocalJet> spin;
+      SetRollingRows(&spin);
+      return Speed(contact.a, contact.b, locals, spin.tangent_a, spin.tangent_b);
+    }
     if (contact.joint >= 0) {
       JointRows<LocalJet> rows;
       LocalJointRows(s_.joints[contact.joint], &locals, &rows);

@@ -75,7 +75,7 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
         continue;
       }
       if constexpr (kLevel == Level::kVelocity && std::is_same_v<Sink, SingleAdjointSink>) {
-        if (contact.joint < 0 && by_hand_) {
+        if (contact.IsOfShapes() && by_hand_) {
           ContactAdjointByHand(static_cast<int>(i), contact);
           continue;
         }

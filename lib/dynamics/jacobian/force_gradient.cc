@@ -48,7 +48,7 @@ class ForceVisitor : private internal::LocalEntries<EntryListSink> {
       const ContactMode mode = solved_.solution->modes[i];
       const bool is_of_pair = (contact.a == force_.a && contact.b == force_.b) ||
                               (contact.a == force_.b && contact.b == force_.a);
-      if (contact.joint >= 0 || !is_of_pair || mode == ContactMode::kOpen) continue;
+      if (!contact.IsOfShapes() || !is_of_pair || mode == ContactMode::kOpen) continue;
       if (force_.component == Component::kNormal) {
         value_ += solved_.solution->normal_impulse[i];
         Seed(RowOf(i), 1.0);

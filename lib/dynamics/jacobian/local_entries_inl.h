@@ -191,6 +191,7 @@ class LocalEntries {
   /// `share`: of a limit of a coupling, whose coordinate.
   void RatesByTwist(const ActiveContact& contact, int share, Locals* twists,
                     ContactRates<LocalJet>* rates) {
+    if (contact.is_rolling) return;  // whose rows do not change
     if (contact.joint >= 0) {
       const JointIndex& joint = s_.joints[contact.joint];
       JointRates<LocalJet> of_joint;
@@ -345,7 +346,7 @@ class LocalEntries {
                    const LocalJet& slip, const Locals& locals, double factor) {
     DecaySource decay;
     // Without friction at rest there is none that slides, whatever the kinetic one is.
-    if (contact.joint >= 0 || rest == 0.0 || !MixedDecay(model_, contact.a, contact.b, &decay)) {
+    if (!contact.IsOfShapes() || rest == 0.0 || !MixedDecay(model_, contact.a, contact.b, &decay)) {
       return 1.0;
     }
     const LocalJet numbers[3] = {LocalJet(rest, 0), LocalJet(decay.kinetic.value, 1),

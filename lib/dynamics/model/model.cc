@@ -128,6 +128,8 @@ void AddBodies(const BasicScene<T>& scene, Places* places, ModelStructure* struc
     }
     index.kinetic_friction = body.kinetic_friction ? places->Take(2) : -1;
     structure->friction_decays = structure->friction_decays || body.kinetic_friction;
+    index.rolling_friction = body.rolling_friction ? places->Take(1) : -1;
+    structure->has_rolling_friction = structure->has_rolling_friction || body.rolling_friction;
     if (body.support) AddSupport(*body.support, places, structure);
     if (body.driven) {
       structure->paths.push_back(
@@ -282,6 +284,8 @@ void AddForcesAndPairs(const BasicScene<T>& scene, Places* places, ModelStructur
     index.restitution = pair.restitution ? places->Take(1) : -1;
     index.kinetic_friction = pair.kinetic_friction ? places->Take(2) : -1;
     structure->friction_decays = structure->friction_decays || pair.kinetic_friction;
+    index.rolling_friction = pair.rolling_friction ? places->Take(1) : -1;
+    structure->has_rolling_friction = structure->has_rolling_friction || pair.rolling_friction;
     structure->pairs.push_back(index);
   }
   for (const auto& [first, second] : scene.no_contact) {
@@ -358,6 +362,7 @@ void FillBodies(const BasicScene<T>& scene, std::vector<T>* numbers) {
       numbers->push_back(*body.kinetic_friction);
       numbers->push_back(body.stribeck_speed);
     }
+    if (body.rolling_friction) numbers->push_back(*body.rolling_friction);
     if (body.support) FillSupport(*body.support, body.mass, numbers);
     if (body.driven) {
       numbers->push_back(body.driven->delay);
@@ -497,6 +502,7 @@ void FillForcesAndPairs(const BasicScene<T>& scene, const State<T>& drawn, int w
       numbers->push_back(*pair.kinetic_friction);
       numbers->push_back(pair.stribeck_speed);
     }
+    if (pair.rolling_friction) numbers->push_back(*pair.rolling_friction);
   }
 }
 

@@ -42,6 +42,7 @@ struct BodyIndex {
   int quadratic_drag = -1;  ///< −1: none
   int friction = -1, restitution = -1;
   int kinetic_friction = -1;  ///< then Stribeck's speed; −1: the friction does not decay
+  int rolling_friction = -1;  ///< −1: none
   ShapeType shape = ShapeType::kNone;
   int shape_numbers = -1;
   int num_shape_numbers = 0;
@@ -134,6 +135,7 @@ struct PairIndex {
   std::vector<bool> first, second;      ///< a body: matches the pattern
   int friction = -1, restitution = -1;  ///< −1: mixed as usual
   int kinetic_friction = -1;            ///< then Stribeck's speed; −1: none of its own
+  int rolling_friction = -1;
 };
 
 /// A body that follows a path: delay, scale, offset (2) and offset of the angle from `numbers` on
@@ -173,8 +175,9 @@ struct ModelStructure {
   std::vector<std::pair<int, int>> joined;  ///< bodies with a joint without contact, ascending
   std::vector<int> moving;                  ///< body of each block
   bool joint_loops = false;
-  bool has_releases = false;     ///< whether joints end at a time
-  bool friction_decays = false;  ///< whether the friction of some contact may (contact.h)
+  bool has_releases = false;          ///< whether joints end at a time
+  bool friction_decays = false;       ///< whether the friction of some contact may (contact.h)
+  bool has_rolling_friction = false;  ///< whether some body or pair has it
   int num_parameters = 0;
 
   int num_bodies() const { return static_cast<int>(bodies.size()); }

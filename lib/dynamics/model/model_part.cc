@@ -23,6 +23,7 @@ class PartTaker {
     to_->scene_name = whole_.scene_name;
     to_->settings = whole_.settings;
     to_->friction_decays = whole_.friction_decays;
+    to_->has_rolling_friction = whole_.has_rolling_friction;
     TakeNumber(kGravityX);
     TakeNumber(kGravityY);
     TakeBodies();
@@ -68,6 +69,7 @@ class PartTaker {
       TakeOne(&index.angular_damping);
       TakeOne(&index.quadratic_drag);
       TakeNumbers(2, &index.kinetic_friction);
+      TakeOne(&index.rolling_friction);
       for (const SupportIndex& support : whole_.supports) {
         if (support.body != body) continue;
         SupportIndex& own = to_->supports.emplace_back(support);
@@ -172,12 +174,13 @@ class PartTaker {
       return std::find(x.begin(), x.end(), true) != x.end();
     };
     for (const PairIndex& pair : whole_.pairs) {
-      PairIndex index{OfPart(pair.first), OfPart(pair.second), pair.friction, pair.restitution,
-                      pair.kinetic_friction};
+      PairIndex index{OfPart(pair.first), OfPart(pair.second),   pair.friction,
+                      pair.restitution,   pair.kinetic_friction, pair.rolling_friction};
       if (!any(index.first) || !any(index.second)) continue;
       TakeOne(&index.friction);
       TakeOne(&index.restitution);
       TakeNumbers(2, &index.kinetic_friction);
+      TakeOne(&index.rolling_friction);
       to_->pairs.push_back(std::move(index));
     }
     for (const auto& [first, second] : whole_.no_contact) {

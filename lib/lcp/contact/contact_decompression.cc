@@ -94,7 +94,7 @@ ContactSolverReport DecompressionSolver::Solve(const ContactSolverOptions& optio
     ContactBlock<double>& contact = problem->contacts[i];
     AddRowTransposed(contact.a, contact.normal_a, contact.b, contact.normal_b, contact.offset,
                      problem->pushed_load.data());
-    contact.driven = contact.offset > 0.0;
+    contact.driven = contact.rolls || contact.offset > 0.0;
     solution->normal_impulse[i] = contact.offset;
     solution->tangent_impulse[i] = 0.0;
     if (contact.driven && solution->modes[i] == ContactMode::kOpen) {
@@ -106,6 +106,7 @@ ContactSolverReport DecompressionSolver::Solve(const ContactSolverOptions& optio
     report.rung = Rung::kModeChanges;
     return finish();
   }
+  if (problem->has_rolling) return finish();
   report.fallbacks.dense += FitsDensePortfolio(*problem) ? 1 : 0;
   if (SolveContactsDense(*problem, options.tolerance, solution, &report.iterations)) {
     for (size_t i = 0; i < problem->contacts.size(); ++i) {

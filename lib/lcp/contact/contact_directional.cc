@@ -24,6 +24,7 @@ RowPart<double> Slanted(const RowPart<double>& n, double factor, const RowPart<d
 ContactKink KinkOf(const ContactProblem<double>& problem, const ContactSolution<double>& solution,
                    const ContactScales& scales, size_t i, bool touching, double tolerance) {
   const ContactBlock<double>& c = problem.contacts[i];
+  if (c.rolls && solution.modes[i] == ContactMode::kOpen) return {};
   const double* v = solution.motion.data();
   const ContactValues values = Evaluate(problem, scales, c, v);
   const double normal = solution.normal_impulse[i];

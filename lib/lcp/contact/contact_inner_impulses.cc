@@ -13,12 +13,15 @@ void InnerImpulses::AddRays(const ContactProblem<double>& problem, double tolera
   const ContactScales scales(problem, solution);
   by_rays_ = problem;
   by_rays_.contacts.clear();
+  by_rays_.has_rolling = false;
   rays_.clear();
   for (size_t i = 0; i < problem.contacts.size(); ++i) {
     const ContactBlock<double>& contact = problem.contacts[i];
     const ContactValues values = Evaluate(problem, scales, contact, v);
     if (contact.limit_given) {
       by_rays_.contacts.push_back(contact);
+      by_rays_.contacts.back().rolls = false;
+      if (solution.modes[i] == ContactMode::kOpen) by_rays_.contacts.back().has_friction = false;
       rays_.push_back({static_cast<int>(i), 0.0});
       continue;
     }

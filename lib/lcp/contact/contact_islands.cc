@@ -106,6 +106,7 @@ void IslandSolver::Gather(const ContactProblem<double>& problem,
   };
   own.num_bodies = static_cast<int>(island.bodies.size());
   own.redundant_joints = problem.redundant_joints;
+  own.has_rolling = problem.has_rolling;
   own.mass.clear();
   own.load.clear();
   own.pushed_load.clear();

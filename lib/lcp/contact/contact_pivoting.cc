@@ -14,6 +14,8 @@ namespace {
 
 // Maximum number of rounds in which sliding contacts that would pull are opened before the start.
 constexpr int kMaxStartRounds = 30;
+// Rounds in which shifts of torques' limits are raised.
+constexpr int kMaxRaises = 8;
 // From this number of contacts on refinement costs a path more than digits that it does not need.
 constexpr size_t kLeastContactsUnrefined = 12;
 
@@ -83,10 +85,11 @@ bool ContactPivoting::SolveSystem() {
       continue;
     }
     if (Slides(mode)) {
-      push(c.a, c.tangent_a, c.b, c.tangent_b, -SlidingSign(mode) * c.friction * shift.b);
+      const double b = c.rolls ? shifts_[i - 1].b : shift.b;
+      push(c.a, c.tangent_a, c.b, c.tangent_b, -SlidingSign(mode) * c.friction * b);
     }
     const size_t row = 3 * static_cast<size_t>(block_of[i]);
-    x_[2 * row] = c.limit_given ? c.offset : delta[row] * shift.centre_n - c.c_n;
+    x_[2 * row] = c.rolls ? 0.0 : c.limit_given ? c.offset : delta[row] * shift.centre_n - c.c_n;
     x_[2 * row + 1] = c.limit_given ? 0.0 : -shift.a_n;
     if (mode == ContactMode::kSticking) {
       x_[2 * row + 2] = delta[row + 1] * shift.centre_t - c.c_t;
@@ -142,6 +145,7 @@ ContactPivoting::Test ContactPivoting::Sliding(int contact) const {
 
 // λ'; 0 for open contacts.
 ContactPivoting::Test ContactPivoting::Impulse(int contact) const {
+  if (problem_->contacts[contact].rolls) --contact;  // whose impulse limits it
   const int block = system_->contact_block()[contact];
   if (block < 0) {
     return {};
@@ -165,6 +169,7 @@ ContactPivoting::Test ContactPivoting::Friction(int contact) const {
 // The inequalities of a contact's mode, at most two.
 int ContactPivoting::Tests(int contact, Test* tests) const {
   const ContactMode mode = modes_[contact];
+  if (mode == ContactMode::kOpen && problem_->contacts[contact].rolls) return 0;
   if (mode == ContactMode::kOpen) {
     tests[0] = Normal(contact);
     tests[0].next =
@@ -208,16 +213,72 @@ bool ContactPivoting::Start(From from) {
     for (size_t i = 0; i < modes_.size(); ++i) {
       if (Slides(modes_[i]) && !problem_->contacts[i].limit_given &&
           Impulse(static_cast<int>(i)).At(1.0) <= 0.0) {
-        modes_[i] = ContactMode::kOpen;
+        SetMode(i, ContactMode::kOpen, 1.0);
         opened = true;
       }
+      opened = TurnsAtLimit(i) || opened;
     }
     if (!opened) {
       RaiseInequalities(from);
-      return true;
+      return !problem_->has_rolling || RaiseFurther();
     }
   }
   return false;
+}
+
+// Rolling friction that would exceed its limit at the start turns there: a shift of the limit would
+// be one of the contact's impulse.
+bool ContactPivoting::TurnsAtLimit(size_t i) {
+  const ContactBlock<double>& c = problem_->contacts[i];
+  if (!c.rolls || modes_[i] != ContactMode::kSticking) return false;
+  const double friction = Friction(static_cast<int>(i)).At(1.0);
+  if (std::abs(friction) < c.friction * Impulse(static_cast<int>(i)).At(1.0)) return false;
+  modes_[i] = friction < 0.0 ? ContactMode::kSlidingPositive : ContactMode::kSlidingNegative;
+  return true;
+}
+
+// Torques at their limits follow the shifts of impulses, so that the solution for these differs
+// from that for which they were found.
+bool ContactPivoting::RaiseFurther() {
+  for (int round = 0; round < kMaxRaises; ++round) {
+    if (!SolveSystem()) return false;
+    bool raised = false;
+    for (size_t k = 0; k < modes_.size(); ++k) {
+      Test tests[2];
+      const int count = Tests(static_cast<int>(k), tests);
+      for (int t = 0; t < count; ++t) {
+        const double lacks = -tests[t].At(1.0);
+        if (!(lacks > 0.0)) continue;
+        raised = true;
+        Shift& shift = shifts_[k];
+        const bool of_speed = Slides(modes_[k]) && tests[t].next == ContactMode::kSticking;
+        if (modes_[k] == ContactMode::kOpen) {
+          shift.a_n += 2.0 * lacks;
+        } else if (of_speed) {
+          shift.a_t += 2.0 * SlidingSign(modes_[k]) * lacks;
+        } else {
+          const double share =
+              modes_[k] == ContactMode::kSticking ? problem_->contacts[k].friction : 1.0;
+          shifts_[problem_->contacts[k].rolls ? k - 1 : k].b += 2.0 * lacks / share;
+        }
+      }
+    }
+    if (!raised) return true;
+  }
+  return false;
+}
+
+// Sets a contact's mode, with which its rolling friction opens and closes.
+void ContactPivoting::SetMode(size_t contact, ContactMode mode, double tau) {
+  const bool opens_or_closes =
+      (modes_[contact] == ContactMode::kOpen) != (mode == ContactMode::kOpen);
+  modes_[contact] = mode;
+  const size_t next = contact + 1;
+  if (!opens_or_closes || next >= modes_.size() || !problem_->contacts[next].rolls) return;
+  modes_[next] = mode == ContactMode::kOpen                      ? ContactMode::kOpen
+                 : !problem_->contacts[next].has_friction        ? ContactMode::kClosed
+                 : Sliding(static_cast<int>(next)).At(tau) > 0.0 ? ContactMode::kSlidingPositive
+                                                                 : ContactMode::kSlidingNegative;
 }
 
 void ContactPivoting::RaiseInequalities(From from) {
@@ -249,6 +310,8 @@ void ContactPivoting::RaiseInequalities(From from) {
     if (Slides(mode)) {
       const double sign = SlidingSign(mode);
       shift.a_t += sign * needed(sign * Sliding(i).At(1.0), speed, Scatter(k, 1));
+    } else if (p.contacts[k].rolls) {
+      continue;  // TurnsAtLimit
     } else if (mode == ContactMode::kSticking) {
       const double friction = std::abs(Friction(i).At(1.0)) / p.contacts[k].friction;
       shift.b = needed(impulse - friction, impulse_scale, Scatter(k, 2));
@@ -325,7 +388,7 @@ double ContactPivoting::Pivot(int contact, ContactMode next, double tau, double 
     next = Sliding(contact).At(tau) > 0.0 ? ContactMode::kSlidingPositive
                                           : ContactMode::kSlidingNegative;
   }
-  modes_[contact] = next;
+  SetMode(static_cast<size_t>(contact), next, tau);
   if (!SolveSystem()) {
     return 0.0;
   }
@@ -355,7 +418,7 @@ bool ContactPivoting::Solve(const ContactProblem<double>& problem, From from, do
   }
   for (size_t i = 0; i < modes_.size(); ++i) {
     const ContactBlock<double>& contact = problem.contacts[i];
-    if (contact.limit_given && modes_[i] == ContactMode::kOpen) {
+    if (contact.limit_given && !contact.rolls && modes_[i] == ContactMode::kOpen) {
       modes_[i] = contact.has_friction ? ContactMode::kSlidingPositive : ContactMode::kClosed;
     }
   }

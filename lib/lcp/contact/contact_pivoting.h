@@ -19,6 +19,8 @@
 // redundant, or nearly so (gaps of a lattice that differ by 1e-9 m), cost pivots but no accuracy: δ
 // determines the impulses among them.
 //
+// Rolling friction is limited by ρ λ' of its contact, with which it opens and closes.
+//
 // Source: R. W. Cottle, J.-S. Pang, R. E. Stone, The Linear Complementarity Problem, 1992, section
 // 4.5 (parametric methods); B. C. Eaves, On the basic theorem of complementarity, 1971.
 
@@ -71,6 +73,9 @@ class ContactPivoting {
   bool SolveSystem();
   bool Start(From from);
   void RaiseInequalities(From from);
+  bool RaiseFurther();
+  bool TurnsAtLimit(size_t i);
+  void SetMode(size_t contact, ContactMode mode, double tau);
   int Tests(int contact, Test* tests) const;
   Event NextEvent(double tau, double direction) const;
   double Pivot(int contact, ContactMode next, double tau, double direction);

@@ -328,7 +328,8 @@ ContactSolverReport ContactSolver::Solve(const ContactProblem<double>& problem,
                                          ContactSolution<double>* solution) {
   const int expansions = system_.expansions();
   const int regularised = system_.regularised_steps();
-  ContactSolverReport report = RunPortfolio(problem, options, solution);
+  ContactSolverReport report = problem.has_rolling ? SolveRolling(problem, options, solution)
+                                                   : RunPortfolio(problem, options, solution);
   report.fallbacks.whole_system = system_.expansions() - expansions;
   report.fallbacks.regularised = system_.regularised_steps() - regularised;
   return report;

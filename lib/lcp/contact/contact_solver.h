@@ -105,6 +105,20 @@ class ContactSolver {
   void Reserve(int num_bodies, int num_joints, int num_contacts);
 
  private:
+  // Problems with rolling friction (contact_rolling.cc).
+  ContactSolverReport SolveRolling(const ContactProblem<double>& problem,
+                                   const ContactSolverOptions& options,
+                                   ContactSolution<double>* solution);
+  // Starts rolled_ and whole_ from a solution for given limits.
+  void StartWhole(const ContactProblem<double>& problem, const ContactSolution<double>& solution);
+  // Whether the modes of rolled_, or modes near them, solve the problem itself.
+  bool SettleWhole(const ContactSolverOptions& options, ContactSolution<double>* solution,
+                   ContactSolverReport* report);
+  bool PivotWhole(const ContactProblem<double>& problem, const ContactSolverOptions& options,
+                  ContactPivoting::From from, ContactSolution<double>* solution,
+                  ContactSolverReport* report);
+  // Changes modes that rolled_ contradicts; whether there were any.
+  bool ChangeRollingModes(const ContactSolverOptions& options);
   ContactSolverReport RunPortfolio(const ContactProblem<double>& problem,
                                    const ContactSolverOptions& options,
                                    ContactSolution<double>* solution);
@@ -150,6 +164,9 @@ class ContactSolver {
   ContactSolution<double> centre_;  ///< only the impulses are used
   std::vector<int> changes_;
   ContactScales scales_;
+  ContactProblem<double> given_, whole_;  ///< with rolling friction
+  ContactSolution<double> rolled_;
+  std::vector<double> loads_;
 };
 
 /// Whether the problem is small enough for the dense portfolio: up to 240 rows of the one-sided

@@ -26,12 +26,15 @@ double DiagonalOf(const ClosedContacts& contacts, size_t contact, int k) {
 
 // Visits row 0 (normal) and, for a sticking contact, row 1 (tangent).
 template <typename Visit>
-void ForEachRow(const ContactBlock<double>& c, ContactMode mode, const Visit& visit) {
-  const double along = -SlidingSign(mode) * c.friction;
+void ForEachRow(const ClosedContacts& contacts, size_t i, const Visit& visit) {
+  const ContactBlock<double>& c = contacts.problem.contacts[i];
+  const ContactMode mode = contacts.modes[i];
+  const double along = c.rolls ? 0.0 : -SlidingSign(mode) * c.friction;
+  const RollingColumn rolling = RollingColumnOf(contacts.problem, contacts.modes, i);
   const RowPart<double> none = {0.0, 0.0, 0.0};
-  visit(0, CondensedRow{Combine(c.normal_a, along, c.tangent_a),
-                        Combine(c.normal_b, along, c.tangent_b), c.driven ? none : c.normal_a,
-                        c.driven ? none : c.normal_b});
+  visit(0, CondensedRow{rolling.AddedTo(Combine(c.normal_a, along, c.tangent_a), rolling.row_a),
+                        rolling.AddedTo(Combine(c.normal_b, along, c.tangent_b), rolling.row_b),
+                        c.driven ? none : c.normal_a, c.driven ? none : c.normal_b});
   if (mode == ContactMode::kSticking) {
     visit(1, CondensedRow{c.tangent_a, c.tangent_b, c.tangent_a, c.tangent_b});
   }
@@ -77,7 +80,7 @@ void ForEachClosedRow(const ClosedContacts& contacts, const Visit& visit) {
       continue;
     }
     const ContactBlock<double>& contact = contacts.problem.contacts[i];
-    ForEachRow(contact, contacts.modes[i], [&](int k, const CondensedRow& row) {
+    ForEachRow(contacts, i, [&](int k, const CondensedRow& row) {
       visit(contact, row, 3 * static_cast<size_t>(contacts.block[i]) + k,
             DiagonalOf(contacts, i, k));
     });
@@ -137,7 +140,7 @@ void AddCondensedContacts(const ClosedContacts& contacts, int edge, BlockLu<doub
     const ContactBlock<double>& contact = contacts.problem.contacts[i];
     const bool both = contact.a >= 0 && contact.b >= 0;
     if (contacts.block[i] >= 0) {
-      ForEachRow(contact, contacts.modes[i], [&](int k, const CondensedRow& row) {
+      ForEachRow(contacts, i, [&](int k, const CondensedRow& row) {
         const double weight = 1.0 / DiagonalOf(contacts, i, k);
         if (contact.a >= 0) {
           AddOuter(row.impulse_a, row.constraint_a, weight, lu->Diagonal(contact.a));

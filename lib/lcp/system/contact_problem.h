@@ -24,7 +24,8 @@
 // An impact's decompression (contact_decompression.h) adds a least impulse o to a contact:
 //   s_n = n v + c_n ≥ 0,   λn ≥ o,   s_n (λn − o) = 0
 // Dry friction in a joint is a contact without a normal row: λn = o = h, and μ is the torque or
-// force at which it slides.
+// force at which it slides. So is the rolling friction of the contact before it, with that
+// contact's λn in the place of o: |torque| ≤ ρ λn against the relative angular velocity.
 // The planar form has a unique, strictly complementary solution at a disc at rest, where the
 // one-sided form of two friction rows has a continuum of solutions.
 
@@ -93,6 +94,10 @@ struct ContactBlock {
   bool driven = false;
   /// Friction with a given limit μ o: its normal rows are 0, and it is always driven.
   bool limit_given = false;
+  /// Rolling friction of the contact before it: μ is ρ, m, and o repeats the λn of that contact at
+  /// the solution. In the mode system a torque at its limit is a part of that λn's column, and its
+  /// own λn is 0.
+  bool rolls = false;
 };
 
 template <typename T>
@@ -103,6 +108,7 @@ struct ContactProblem {
   std::vector<T> load;  ///< p, 3 num_bodies
   std::vector<JointBlock<T>> joints;
   bool redundant_joints = false;  ///< joints form loops: their rows may be dependent
+  bool has_rolling = false;       ///< whether some contact has rolling friction
   std::vector<ContactBlock<T>> contacts;
   /// p + Σ nᵀ o, empty where no contact has an offset; it gives the size of speeds. A body that the
   /// compression stopped has p = 0 to rounding, and is pushed from both sides.
@@ -117,7 +123,7 @@ struct ContactProblem {
     dampers.clear();
     load.clear();
     joints.clear();
-    redundant_joints = false;
+    redundant_joints = has_rolling = false;
     contacts.clear();
     pushed_load.clear();
   }
@@ -150,6 +156,32 @@ struct ContactSolution {
 /// x + factor y.
 inline RowPart<double> Combine(const RowPart<double>& x, double factor, const RowPart<double>& y) {
   return {x[0] + factor * y[0], x[1] + factor * y[1], x[2] + factor * y[2]};
+}
+
+/// What the torque of rolling friction at its limit adds to the column of a contact's λn.
+struct RollingColumn {
+  double along = 0.0;  ///< −σ ρ, m; 0: none
+  RowPart<double> row_a, row_b;
+
+  RowPart<double> AddedTo(const RowPart<double>& column, const RowPart<double>& row) const {
+    return along == 0.0 ? column : Combine(column, along, row);
+  }
+};
+inline RollingColumn RollingColumnOf(const ContactProblem<double>& problem,
+                                     const std::vector<ContactMode>& modes, size_t contact) {
+  if (!problem.has_rolling || contact + 1 >= problem.contacts.size()) return {};
+  const ContactBlock<double>& next = problem.contacts[contact + 1];
+  if (!next.rolls) return {};
+  return {-SlidingSign(modes[contact + 1]) * next.friction, next.tangent_a, next.tangent_b};
+}
+
+/// Repeats the normal impulses of contacts in the blocks of their rolling friction.
+inline void TakeRollingLimits(const ContactSolution<double>& solution,
+                              ContactProblem<double>* problem) {
+  for (size_t i = 1; problem->has_rolling && i < problem->contacts.size(); ++i) {
+    ContactBlock<double>& block = problem->contacts[i];
+    if (block.rolls) block.offset = std::max(0.0, solution.normal_impulse[i - 1]);
+  }
 }
 
 /// block += leftᵀ weight right, 3 x 3 by rows.

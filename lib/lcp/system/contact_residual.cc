@@ -233,6 +233,9 @@ double NaturalResidual(const ContactProblem<double>& problem,
     const double normal = solution.normal_impulse[i];
     const double zeta = NormalScale(c, values, scales.impulse);
     double residual = RowResidual(normal - c.offset, zeta, values.s_n, values.scale_n);
+    if (c.rolls) {
+      residual = zeta > 0.0 ? std::abs(normal - solution.normal_impulse[i - 1]) / zeta : 0.0;
+    }
     if (c.has_friction) {
       const double limit = c.friction * normal;
       const double tangent = solution.tangent_impulse[i];

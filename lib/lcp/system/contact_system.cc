@@ -215,23 +215,26 @@ void ContactSystem::AddContacts(const ContactProblem<double>& problem,
     diagonal[0] = contact.driven ? 1.0 : delta[0];
     diagonal[4] = sticks ? delta[1] : 1.0;
     diagonal[8] = 1.0;
-    const double along = -SlidingSign(modes[i]) * contact.friction;
-    const auto add = [&](const RowPart<double>& normal, const RowPart<double>& tangent) {
+    const double along = contact.rolls ? 0.0 : -SlidingSign(modes[i]) * contact.friction;
+    const RollingColumn rolling = RollingColumnOf(problem, modes, i);
+    const auto add = [&](const RowPart<double>& normal, const RowPart<double>& tangent,
+                         const RowPart<double>& turn) {
       --edge;
       if (!contact.driven) {
         AddToRow(normal, 0, lu_.SecondFirst(edge));
       }
-      SubtractFromColumn(Combine(normal, along, tangent), 0, lu_.FirstSecond(edge));
+      SubtractFromColumn(rolling.AddedTo(Combine(normal, along, tangent), turn), 0,
+                         lu_.FirstSecond(edge));
       if (sticks) {
         AddToRow(tangent, 1, lu_.SecondFirst(edge));
         SubtractFromColumn(tangent, 1, lu_.FirstSecond(edge));
       }
     };
     if (contact.b >= 0) {
-      add(contact.normal_b, contact.tangent_b);
+      add(contact.normal_b, contact.tangent_b, rolling.row_b);
     }
     if (contact.a >= 0) {
-      add(contact.normal_a, contact.tangent_a);
+      add(contact.normal_a, contact.tangent_a, rolling.row_a);
     }
   }
 }

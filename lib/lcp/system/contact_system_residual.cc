@@ -53,8 +53,10 @@ class ContactSystem::ColumnResidual {
     }
   }
 
-  void Contact(const ContactBlock<double>& c, ContactMode mode, int block) {
-    const double along = -SlidingSign(mode) * c.friction;  // the impulse's part on the tangent
+  void Contact(const ContactBlock<double>& c, ContactMode mode, const RollingColumn& rolling,
+               int block) {
+    // The impulse's part on the tangent.
+    const double along = c.rolls ? 0.0 : -SlidingSign(mode) * c.friction;
     const double impulse = At(block, 0);
     // A driven contact has a column like any other, but its row is λn alone.
     double row = c.driven && !kTransposed ? impulse : Dot(c.a, c.normal_a, c.b, c.normal_b);
@@ -72,6 +74,11 @@ class ContactSystem::ColumnResidual {
       } else {
         Push(c.a, c.tangent_a, c.b, c.tangent_b, along * impulse);
       }
+    }
+    if (rolling.along != 0.0 && kTransposed) {
+      row += rolling.along * Dot(c.a, rolling.row_a, c.b, rolling.row_b);
+    } else if (rolling.along != 0.0) {
+      Push(c.a, rolling.row_a, c.b, rolling.row_b, rolling.along * impulse);
     }
     Constrain(block, 0, row);
   }
@@ -161,7 +168,8 @@ ContactSystem::ResidualSize ContactSystem::ResidualWith(
     column.Joints();
     for (size_t i = 0; i < problem.contacts.size(); ++i) {
       if (contact_block_[i] >= 0) {
-        column.Contact(problem.contacts[i], modes[i], contact_block_[i]);
+        column.Contact(problem.contacts[i], modes[i], RollingColumnOf(problem, modes, i),
+                       contact_block_[i]);
       }
     }
     column.FreeMotion(free.values + std::min(c, free.columns - 1), free.columns);

@@ -78,10 +78,11 @@ bool ModeSolve::Solve(const ContactProblem<double>& problem, const ContactSoluti
     }
     const ContactBlock<double>& contact = problem.contacts[i];
     const size_t row = 3 * static_cast<size_t>(block_of[i]);
-    rhs[row] = contact.driven ? contact.offset : -contact.c_n;
+    const double driven = contact.rolls ? 0.0 : contact.offset;
+    rhs[row] = contact.driven ? driven : -contact.c_n;
     rhs[row + 1] = sticks(i) ? -contact.c_t : 0.0;
     if (centre != nullptr) {
-      start_[row] = contact.driven ? contact.offset : centre->normal_impulse[i];
+      start_[row] = contact.driven ? driven : centre->normal_impulse[i];
       start_[row + 1] = sticks(i) ? centre->tangent_impulse[i] : 0.0;
     }
   }
@@ -113,12 +114,13 @@ bool ModeSolve::Solve(const ContactProblem<double>& problem, const ContactSoluti
       continue;
     }
     const size_t row = 3 * static_cast<size_t>(block_of[i]);
-    solution->normal_impulse[i] = x_[row];
+    const bool rolls = problem.contacts[i].rolls;
+    solution->normal_impulse[i] = rolls ? solution->normal_impulse[i - 1] : x_[row];
     if (sticks(i)) {
       solution->tangent_impulse[i] = x_[row + 1];
     } else if (SlidingSign(modes[i]) != 0.0) {
       solution->tangent_impulse[i] =
-          -SlidingSign(modes[i]) * problem.contacts[i].friction * x_[row];
+          -SlidingSign(modes[i]) * problem.contacts[i].friction * solution->normal_impulse[i];
     }
   }
   return true;

@@ -31,6 +31,10 @@ constexpr size_t kRankEachStep = 150;
 std::string ContactName(const ModelStructure& structure, const ActiveContact& contact) {
   if (contact.is_servo) return NameOfServo(structure, contact);
   if (contact.is_support) return "support of body " + structure.bodies[contact.a].name;
+  if (contact.is_rolling) {
+    return "rolling friction of " + structure.bodies[contact.a].name + " and " +
+           structure.bodies[contact.b].name;
+  }
   if (contact.IsJointFriction()) {
     return (contact.is_motor ? "motor of joint " : "friction in joint ") +
            structure.joints[contact.joint].name;

@@ -29,7 +29,7 @@ namespace {
 // Whether a segment ends because two bodies that were apart touch.
 bool EndsInMeeting(const Model<double>& model, const Segment& segment) {
   const ActiveContact& contact = segment.event_contact;
-  if (segment.event != EventKind::kTouch || contact.joint >= 0 ||
+  if (segment.event != EventKind::kTouch || !contact.IsOfShapes() ||
       HasPair(segment.contacts, contact)) {
     return false;
   }
@@ -42,7 +42,7 @@ bool EndsInMeeting(const Model<double>& model, const Segment& segment) {
 // before, that feature may be far from the other body.
 bool BeginsInPenetration(const Model<double>& model, const Segment& segment) {
   const ActiveContact& contact = segment.event_contact;
-  if (segment.event != EventKind::kTouch || contact.joint >= 0) return false;
+  if (segment.event != EventKind::kTouch || !contact.IsOfShapes()) return false;
   ContactRows<double> rows;
   EvaluateContactRows(model, segment.after, contact, &rows);
   const double size = std::max(RadiusOf(model, contact.a), RadiusOf(model, contact.b));
@@ -195,7 +195,7 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
   loaded_.clear();
   double largest = 0.0;
   for (size_t i = 0; i < segment->contacts.size(); ++i) {
-    if (!segment->contacts[i].IsJointFriction()) {
+    if (!segment->contacts[i].IsPureFriction()) {
       largest = std::max(largest, share.normal_impulse[i]);
     }
   }
@@ -211,13 +211,13 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
       AddMargin(margin, place, what);
       certificate_.degenerate_rows += margin < kDegenerateTolerance ? 1 : 0;
     };
-    if (!contact.IsJointFriction()) {
+    if (!contact.IsPureFriction()) {
       if (!motion_follows) add_margin(largest > 0.0 ? normal / largest : 0.0, "normal force");
       if (normal > kLoaded * largest) {
         loaded_.push_back(contact);
       }
     }
-    if (contact.joint < 0 && !HasPair(closed_, contact) &&
+    if (contact.IsOfShapes() && !HasPair(closed_, contact) &&
         MeetsACorner(model, segment->before, contact)) {
       AddJump(0.0, place, "a corner meets a corner");
     }

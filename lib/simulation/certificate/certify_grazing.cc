@@ -42,7 +42,7 @@ double Least(const GapCourse& start, const GapCourse& end, double length) {
 bool Closed(const Segment& segment, const ActiveContact& contact) {
   return std::any_of(segment.contacts.begin(), segment.contacts.end(),
                      [&](const ActiveContact& other) {
-                       return other.joint < 0 && other.a == contact.a && other.b == contact.b;
+                       return other.IsOfShapes() && other.a == contact.a && other.b == contact.b;
                      });
 }
 
@@ -52,7 +52,7 @@ class GrazeFinder {
       : model_(model), search_(model), most_(most), grazes_(*grazes) {}
 
   void Add(const Segment& segment) {
-    if (segment.event == EventKind::kTouch && segment.event_contact.joint < 0 &&
+    if (segment.event == EventKind::kTouch && segment.event_contact.IsOfShapes() &&
         !TakesOver(segment)) {
       AddTouch(segment);
     }
@@ -64,7 +64,7 @@ class GrazeFinder {
     for (const ActiveContact& contact : near_) {
       const bool touches =
           segment.event == EventKind::kTouch && contact.SameAs(segment.event_contact);
-      if (contact.joint < 0 && !touches && !Closed(segment, contact)) {
+      if (contact.IsOfShapes() && !touches && !Closed(segment, contact)) {
         AddMiss(segment, contact);
       }
     }

@@ -29,7 +29,7 @@ inline double Negligible(const Model<double>& model, double speed) {
 // Whether one of the contacts is between the shapes of the same two bodies.
 inline bool HasPair(const std::vector<ActiveContact>& contacts, const ActiveContact& contact) {
   return std::any_of(contacts.begin(), contacts.end(), [&](const ActiveContact& other) {
-    return other.joint < 0 && other.a == contact.a && other.b == contact.b;
+    return other.IsOfShapes() && other.a == contact.a && other.b == contact.b;
   });
 }
 

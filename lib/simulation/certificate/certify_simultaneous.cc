@@ -98,7 +98,7 @@ void RolloutCertifier::AddSimultaneous(const Model<double>& model, long step,
     for (size_t l = 0; l < k; ++l) {
       const ActiveContact& x = impact.contacts[approaching[k]];
       const ActiveContact& y = impact.contacts[approaching[l]];
-      if (impact.time > 0.0 && (x.a != y.a || x.b != y.b || x.joint >= 0 || y.joint >= 0)) {
+      if (impact.time > 0.0 && (x.a != y.a || x.b != y.b || !x.IsOfShapes() || !y.IsOfShapes())) {
         AddMargin(0.0, place, "two contacts touch at the same time");
       }
       for (const int body : {x.a, x.b}) {
@@ -142,6 +142,7 @@ void RolloutCertifier::AddUnloaded(const Model<double>& model, long step, const 
   }
   for (size_t i = 0; any && i < impact.contacts.size(); ++i) {
     const ActiveContact& c = impact.contacts[i];
+    if (c.is_rolling) continue;
     const double before = speed(i);
     const bool loaded = std::any_of(loaded_.begin(), loaded_.end(),
                                     [&](const ActiveContact& l) { return l.SameAs(c); });
@@ -188,7 +189,7 @@ void RolloutCertifier::AddClosedAtOnce(const Model<double>& model, long step,
     const ActiveContact& contact = segment.contacts[i];
     const bool is_loaded = std::any_of(loaded_.begin(), loaded_.end(),
                                        [&](const auto& l) { return l.SameAs(contact); });
-    if (contact.joint >= 0 || !is_loaded || HasPair(closed_, contact)) {
+    if (!contact.IsOfShapes() || !is_loaded || HasPair(closed_, contact)) {
       continue;
     }
     for (const size_t k : begun) {

@@ -23,7 +23,7 @@ namespace {
 bool Sticks(const Segment* segment, const ActiveContact& contact) {
   for (size_t i = 0; segment != nullptr && i < segment->contacts.size(); ++i) {
     if (segment->contacts[i].SameAs(contact)) {
-      return contact.joint < 0 && segment->modes[i] == ContactMode::kSticking;
+      return contact.IsOfShapes() && segment->modes[i] == ContactMode::kSticking;
     }
   }
   return false;
@@ -159,7 +159,7 @@ void RolloutCertifier::AddStart(const Model<double>& model, const EventRecord& r
             : part.is_impulses ? &part.impulses.before
                                : &part.segment.before;
     for (const ActiveContact& contact : contacts) {
-      if (!contact.IsJointFriction()) touching.push_back(&contact);
+      if (!contact.IsPureFriction()) touching.push_back(&contact);
     }
     if (!part.is_impulses && part.segment.length > 0.0) {
       first = &part.segment;
@@ -257,7 +257,7 @@ void RolloutCertifier::ProbeStarts(const Model<double>& model, const State<doubl
   for (const ActiveContact* contact : touching) {
     const bool is_new = std::none_of(resting.begin(), resting.end(),
                                      [&](const auto& other) { return other.SameAs(*contact); });
-    if (contact->joint < 0 && is_new && Rests(model, start, *contact)) {
+    if (contact->IsOfShapes() && is_new && Rests(model, start, *contact)) {
       resting.push_back(*contact);
     }
   }

@@ -30,7 +30,7 @@ ChoiceKey KeyOf(ChoiceKind kind, long when, int detail, const ActiveContact& con
               : contact.side < 0.0 ? 2
                                    : 0) +
              (contact.is_motor ? 4 : 0) + (contact.is_servo ? 8 : 0) +
-             (contact.is_support ? 16 : 0);
+             (contact.is_support ? 16 : 0) + (contact.is_rolling ? 32 : 0);
   key.feature = static_cast<int>(contact.feature.kind);
   key.feature_a = contact.feature.a;
   key.feature_b = contact.feature.b;
@@ -221,7 +221,7 @@ void ChoiceWatch::AddFixed(const Model<double>& model, long step, Stepper* stepp
     }
     for (int k = 0; k < count; ++k) {
       // Friction in a joint has no normal row.
-      if (contact.IsJointFriction() && k == 0) continue;
+      if (contact.IsPureFriction() && k == 0) continue;
       const ChoiceKind kind =
           with_face && k == 1 ? ChoiceKind::kFrictionLimit : KindOf(slacks[k].kind);
       const auto add = [&](double slack, int side) {
@@ -272,7 +272,7 @@ void ChoiceWatch::AddApproached(const Model<double>& model, long step, const Ste
   const ActiveContact& contact = record.contacts[i];
   const bool is_new = std::none_of(last_contacts_.begin(), last_contacts_.end(),
                                    [&](const ActiveContact& last) { return last.SameAs(contact); });
-  if (!is_new || contact.IsJointFriction() || !(contact.gap > 0.0)) return;
+  if (!is_new || contact.IsPureFriction() || !(contact.gap > 0.0)) return;
   const bool rebounds = contact.law == ContactLaw::kRestitution;
   const double slack = contact.gap - (rebounds ? model.structure->settings.contact_margin : 0.0);
   if (!(slack > 0.0)) return;
@@ -441,7 +441,7 @@ void ChoiceWatch::AddForces(const Model<double>& model, const IslandRecord& isla
     phase->pending.push_back({KeyOf(kind, when, 64 + side + static_cast<int>(mode), contact),
                               contact, segment.time, slack, scale});
   };
-  if (!contact.IsJointFriction()) {
+  if (!contact.IsPureFriction()) {
     add(ChoiceKind::kOpening, share.normal_impulse[i], largest);
     if (segment.time == 0.0 && segment.contacts[i].law == ContactLaw::kRecovery) {
       ContactRows<double> rows;

@@ -59,14 +59,14 @@ DiscreteMapWatch::Touch* DiscreteMapWatch::FindLast(const ActiveContact& contact
 
 DiscreteMapWatch::Touch* DiscreteMapWatch::FindHandedOver(const Model<double>& model,
                                                           const Touch& touch) {
-  if (model.seams == nullptr || touch.contact.joint >= 0) return nullptr;
+  if (model.seams == nullptr || !touch.contact.IsOfShapes()) return nullptr;
   const std::vector<BodyIndex>& bodies = model.structure->bodies;
   const auto moving = [&](const ActiveContact& c) { return bodies[c.a].block >= 0 ? c.a : c.b; };
   const auto driven = [&](const ActiveContact& c) { return bodies[c.a].block >= 0 ? c.b : c.a; };
   const int body = moving(touch.contact);
   if (bodies[driven(touch.contact)].block >= 0) return nullptr;
   for (Touch& last : last_) {
-    if (!last.continues && last.contact.joint < 0 && moving(last.contact) == body &&
+    if (!last.continues && last.contact.IsOfShapes() && moving(last.contact) == body &&
         bodies[driven(last.contact)].block < 0 &&
         (last.normal - touch.normal).norm() <= kFlushTurn) {
       return &last;
@@ -102,7 +102,7 @@ const std::vector<ContactChange>& DiscreteMapWatch::AddStep(const Model<double>&
   without_last_.clear();
   for (size_t i = 0; i < record.contacts.size(); ++i) {
     const ActiveContact& contact = record.contacts[i];
-    if (contact.IsJointFriction()) continue;
+    if (contact.IsPureFriction()) continue;
     const bool closed = record.solution.modes[i] != ContactMode::kOpen;
     if (!closed && !JustTouches(record, i)) continue;
     if (closed && contact.law == ContactLaw::kRestitution) {

@@ -329,7 +329,7 @@ double FeatureChangeMargin(const Model<double>& model, const StepRecord& record,
   const bool closed = std::any_of(record.solution.modes.begin() + static_cast<long>(first),
                                   record.solution.modes.begin() + static_cast<long>(last),
                                   [](ContactMode mode) { return mode != ContactMode::kOpen; });
-  if (!closed || record.contacts[first].joint >= 0) {
+  if (!closed || !record.contacts[first].IsOfShapes()) {
     return kInfinity;
   }
   return PairTies(model, record, first, last, system).Margin();
@@ -373,8 +373,8 @@ bool MeetsACorner(const Model<double>& model, const State<double>& state,
 
 bool IsHandedOver(const Model<double>& model, const State<double>& state,
                   const ActiveContact& contact, double time) {
-  if (contact.joint >= 0 || (ShapeOfA(model, contact).type != ShapeType::kCircle &&
-                             ShapeOfB(model, contact).type != ShapeType::kCircle)) {
+  if (!contact.IsOfShapes() || (ShapeOfA(model, contact).type != ShapeType::kCircle &&
+                                ShapeOfB(model, contact).type != ShapeType::kCircle)) {
     return false;
   }
   const auto beside = [&](int body, double after) {

@@ -87,7 +87,8 @@ class Course {
       if (part.is_impulses || !(part.segment.length > 0.0)) continue;
       return std::any_of(part.segment.contacts.begin(), part.segment.contacts.end(),
                          [&](const ActiveContact& other) {
-                           return other.joint < 0 && other.a == contact.a && other.b == contact.b;
+                           return other.IsOfShapes() && other.a == contact.a &&
+                                  other.b == contact.b;
                          });
     }
     return false;
@@ -111,7 +112,7 @@ class Course {
       after.twist = part.is_impulses ? part.impulses.new_twist : part.segment.after.twist;
       for (const ActiveContact& contact :
            part.is_impulses ? part.impulses.contacts : part.segment.contacts) {
-        if (contact.joint >= 0) continue;
+        if (!contact.IsOfShapes()) continue;
         const double slip = std::abs(SpeedsOf(model, before, contact).slip);
         if (std::abs(SpeedsOf(model, after, contact).slip) <= kEndedSlip * slip) {
           jams_.emplace_back(island.InWhole(contact), slip);
@@ -347,7 +348,7 @@ bool MayJam(const Model<double>& model, const State<double>& start,
   // The body is wedged between faces that are not parallel.
   const Vector2<double> along = rows.geometry.normal;
   return std::any_of(touching.begin(), touching.end(), [&](const ActiveContact& other) {
-    if (other.joint >= 0 || !(MixedFriction(model, other.a, other.b).value > 0.0)) return false;
+    if (!other.IsOfShapes() || !(MixedFriction(model, other.a, other.b).value > 0.0)) return false;
     const auto shares = [&](int body) {
       return moves(body) && (body == other.a || body == other.b);
     };

@@ -177,11 +177,12 @@ bool StepDirectional::ChooseImpulses(const Model<double>& model, const StepRecor
   for (size_t i = 0; i < problem.contacts.size(); ++i) {
     const int block = system.contact_block()[i];
     const double sign = SlidingSign(along.modes[i]);
-    solution->normal_impulse[i] = block < 0 ? 0.0 : x[3 * block];
-    solution->tangent_impulse[i] = block < 0 ? 0.0
-                                   : sign != 0.0
-                                       ? -sign * problem.contacts[i].friction * x[3 * block]
-                                       : x[3 * block + 1];
+    const bool rolls = problem.contacts[i].rolls;
+    const double normal = block < 0 ? 0.0 : rolls ? solution->normal_impulse[i - 1] : x[3 * block];
+    solution->normal_impulse[i] = normal;
+    solution->tangent_impulse[i] = block < 0     ? 0.0
+                                   : sign != 0.0 ? -sign * problem.contacts[i].friction * normal
+                                                 : x[3 * block + 1];
   }
   int worst;
   return NaturalResidual(problem, *solution, &worst) <= kHoldsAsWell;

@@ -51,7 +51,7 @@ EllipseMotion LongestEllipseMotion(const Model<double>& model, const State<doubl
   State<double> rates;
   for (size_t i = 0; i < contacts.size(); ++i) {
     const ActiveContact& contact = contacts[i];
-    if (contact.joint >= 0 || accelerations.modes[i] == ContactMode::kOpen) continue;
+    if (!contact.IsOfShapes() || accelerations.modes[i] == ContactMode::kOpen) continue;
     const ShapeView<double> shape_a = ShapeOfA(model, contact);
     const ShapeView<double> shape_b = ShapeOfB(model, contact);
     if (shape_a.type != ShapeType::kEllipse && shape_b.type != ShapeType::kEllipse) continue;

@@ -102,6 +102,7 @@ bool EventStepper::Decompress(const Model<double>& model, const Impulses& compre
                             : NameOfContact(s, impact.contacts, solved.worst_contact));
     return false;
   }
+  TakeRollingLimits(solution, &impact.problem);
   decompression_.system().MoveFactorsTo(&impact.system);
   SpreadTwists(s, solution.motion, &state->twist);
   impact.new_twist = state->twist;

@@ -195,7 +195,7 @@ double EventDerivative::EventGradient(const Model<double>& model, Segment* segme
         continue;
       }
       const CoefficientSource& friction = segment->event_friction;
-      seed(3 * block_of[i], 0) = friction.value;
+      seed(3 * block_of[segment->NormalOf(i)], 0) += friction.value;
       seed(3 * block_of[i] + 1, 0) = -segment->event_sign;
       for (int k = 0; k < 2; ++k) {
         if (friction.numbers[k] >= 0) {

@@ -48,7 +48,7 @@ void EventDerivative::KeepCompression(const Impulses& impulses) {
 // λn = e λ¹n: e̊ λ¹n is among the entries of the step's Jacobian, e λ̊¹n is added here.
 void EventDerivative::AddOffsetsTangent(const Impulses& impulses) {
   for (size_t i = 0; i < impulses.contacts.size(); ++i) {
-    if (impulses.problem.contacts[i].driven) {
+    if (impulses.problem.contacts[i].driven && !impulses.problem.contacts[i].rolls) {
       solve_.rates().row(3 * static_cast<Eigen::Index>(impulses.system.contact_block()[i])) +=
           impulses.restitution[i].value * compression_dot_.row(impulses.compressed[i]);
     }
@@ -63,7 +63,7 @@ void EventDerivative::KeepOffsetsAdjoint(const Impulses& impulses) {
   const int count = 1 + *std::max_element(impulses.compressed.begin(), impulses.compressed.end());
   compression_bar_.setZero(count, solve_.rates().cols());
   for (size_t i = 0; i < impulses.contacts.size(); ++i) {
-    if (impulses.problem.contacts[i].driven) {
+    if (impulses.problem.contacts[i].driven && !impulses.problem.contacts[i].rolls) {
       compression_bar_.row(impulses.compressed[i]) =
           impulses.restitution[i].value *
           solve_.rates().row(3 * static_cast<Eigen::Index>(impulses.system.contact_block()[i]));

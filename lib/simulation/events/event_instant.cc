@@ -272,7 +272,9 @@ std::string NameOfContact(const ModelStructure& structure,
     return "joints";
   }
   const ActiveContact& contact = contacts[index];
-  return contact.is_servo            ? NameOfServo(structure, contact)
+  return contact.is_servo     ? NameOfServo(structure, contact)
+         : contact.is_rolling ? "rolling friction of " + structure.bodies[contact.a].name +
+                                    " and " + structure.bodies[contact.b].name
          : contact.is_motor          ? "motor of joint " + structure.joints[contact.joint].name
          : contact.IsJointFriction() ? "friction in joint " + structure.joints[contact.joint].name
          : contact.joint >= 0        ? "limit of joint " + structure.joints[contact.joint].name
@@ -320,6 +322,9 @@ bool EventStepper::Settle(const Model<double>& model, const Impulses& impact, St
   bool any_slides = false;  // although it should stick
   for (size_t i = 0; i < impact.contacts.size(); ++i) {
     const ActiveContact& contact = impact.contacts[i];
+    if (contact.is_rolling && (held.contacts.empty() || !held.contacts.back().RollsBy(contact))) {
+      continue;
+    }
     const ContactBlock<double>& block = impact.problem.contacts[i];
     const auto speed = [&](const State<double>& at) {
       return RelativeSpeed(at, contact.a, block.normal_a, contact.b, block.normal_b);

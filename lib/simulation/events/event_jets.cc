@@ -85,7 +85,7 @@ class EventReplay {
     if (impulses->decompression) {
       SetOffsets(*impulses, &problem);
     } else if (route_ == JetRoute::kUnrolled && is_impact) {
-      const bool converged = SolveUnrolled(problem, solution);
+      const bool converged = SolveUnrolled(problem, impulses->solution, solution);
       double difference = 0.0;
       double size = 0.0;
       for (size_t i = 0; i < impulses->solution.motion.size(); ++i) {
@@ -113,7 +113,7 @@ class EventReplay {
     std::vector<double> signs(segment.contacts.size(), 0.0);
     for (size_t i = 0; i < signs.size(); ++i) {
       signs[i] = SlidingSign(segment.modes[i]);
-      if (segment.modes[i] == ContactMode::kClosed && segment.contacts[i].joint < 0) {
+      if (segment.modes[i] == ContactMode::kClosed && segment.contacts[i].IsOfShapes()) {
         ContactRows<double> rows;
         EvaluateContactRows(values_, node->state, segment.contacts[i], &rows);
         signs[i] = SlipSign(node->state, segment.contacts[i], rows);

@@ -131,6 +131,8 @@ struct Segment {
     }
     return false;
   }
+  /// The contact whose normal force limits the friction of contact i.
+  size_t NormalOf(size_t i) const { return contacts[i].is_rolling ? i - 1 : i; }
   /// Σ (friction · normal force − sign · tangential force) over the contacts that stick with k, N.
   template <typename T>
   T FrictionLeft(size_t k, const T& coefficient, double sign,

@@ -29,8 +29,9 @@ double SpeedOf(const double* twist, double radius) {
 // rounding counts as 0: where no force acts (no gravity, bodies that coast side by side) all
 // computed forces are rounding.
 double Inert(const Model<double>& model, const Lengths& lengths, const ActiveContact& contact) {
-  const bool turns = contact.IsJointFriction() &&
-                     model.structure->joints[contact.joint].type != JointType::kPrismatic;
+  const bool turns =
+      contact.is_rolling || (contact.IsJointFriction() &&
+                             model.structure->joints[contact.joint].type != JointType::kPrismatic);
   double inert = 0.0;
   for (const int body : {contact.a, contact.b}) {
     const BodyIndex& index = model.structure->bodies[body];
@@ -51,7 +52,7 @@ double LargestForce(const Segment& motion) {
     scale = std::max(scale, std::abs(load));
   }
   for (size_t k = 0; k < start.solution.normal_impulse.size(); ++k) {
-    if (!motion.contacts[k].IsJointFriction()) {
+    if (!motion.contacts[k].IsPureFriction()) {
       scale = std::max(scale, std::abs(start.solution.normal_impulse[k]));
     }
   }
@@ -223,7 +224,7 @@ bool EventSearch::IsDetermined(const Event& event, SolvedNode* node) const {
   std::vector<double> seed(3 * static_cast<size_t>(node->system.num_blocks()), 0.0);
   const std::vector<int>& block_of = node->system.contact_block();
   const auto add = [&](size_t i, double of_normal, double of_tangent) {
-    seed[3 * static_cast<size_t>(block_of[i])] = of_normal;
+    seed[3 * static_cast<size_t>(block_of[segment_->NormalOf(i)])] += of_normal;
     seed[3 * static_cast<size_t>(block_of[i]) + 1] = of_tangent;
   };
   if (event.kind == EventKind::kLiftOff) {
@@ -379,7 +380,7 @@ void EventSearch::SearchClosed(const Model<double>& model, Event* event) {
     const double tolerance =
         std::max(kForceTolerance * scale, Inert(model, lengths_, segment_->contacts[i]) * slow_ /
                                               model.structure->settings.dt);
-    if (!segment_->contacts[i].IsJointFriction()) {
+    if (!segment_->contacts[i].IsPureFriction()) {
       trial.kind = EventKind::kLiftOff;
       try_function(start.normal_impulse[i], tolerance);
     }

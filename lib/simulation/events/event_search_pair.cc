@@ -106,7 +106,7 @@ class EventSearch::PairSearch {
     return found;
   }
   bool IsOfPair(const ActiveContact& contact) const {
-    return contact.joint < 0 && contact.a == a_ && contact.b == b_ &&
+    return contact.IsOfShapes() && contact.a == a_ && contact.b == b_ &&
            contact.feature.part_a == parts_.a && contact.feature.part_b == parts_.b;
   }
   bool IsClosed(const ActiveContact& contact) const { return Contains(segment_.contacts, contact); }
@@ -214,7 +214,7 @@ bool EventSearch::PairSearch::Continues(const State<double>& state, const Active
 bool EventSearch::PairSearch::RestsAtSeams() const {
   if (outline_ != nullptr) {
     return std::any_of(segment_.contacts.begin(), segment_.contacts.end(),
-                       [&](const auto& c) { return c.joint < 0 && c.a == a_ && c.b == b_; });
+                       [&](const auto& c) { return c.IsOfShapes() && c.a == a_ && c.b == b_; });
   }
   const bool first = model_.SeamsOf(a_, parts_.a) != nullptr;
   if (!first && model_.SeamsOf(b_, parts_.b) == nullptr) {
@@ -222,8 +222,9 @@ bool EventSearch::PairSearch::RestsAtSeams() const {
   }
   const int moving = first ? b_ : a_;
   return std::any_of(segment_.contacts.begin(), segment_.contacts.end(), [&](const auto& contact) {
-    return contact.joint < 0 && ((contact.a == moving && model_.SeamsOf(contact.b, 0) != nullptr) ||
-                                 (contact.b == moving && model_.SeamsOf(contact.a, 0) != nullptr));
+    return contact.IsOfShapes() &&
+           ((contact.a == moving && model_.SeamsOf(contact.b, 0) != nullptr) ||
+            (contact.b == moving && model_.SeamsOf(contact.a, 0) != nullptr));
   });
 }
 
@@ -512,7 +513,7 @@ ActiveContact EventSearch::PairSearch::NextOf(const Sample& sample) {
 void EventSearch::FindHandOvers(const Model<double>& model, Event* event) {
   for (const auto& [first, second] : pairs_) {
     const int a = first, b = second;
-    if (event->contact.joint < 0 && event->contact.a == a && event->contact.b == b) continue;
+    if (event->contact.IsOfShapes() && event->contact.a == a && event->contact.b == b) continue;
     ForEachNearPart(model, a, b, [&](PartPair parts) {
       PairSearch(this, model, a, b, parts, event).AddHandOver(&hand_overs_);
     });

@@ -58,7 +58,9 @@ void KeepClosed(const std::vector<ContactMode>& modes, double recovered, double 
                 std::vector<double>* slip, Segment* segment) {
   size_t kept = 0;
   for (size_t i = 0; i < segment->contacts.size(); ++i) {
-    if (modes[i] == ContactMode::kOpen) {
+    const bool rolls = segment->contacts[i].is_rolling;
+    if (modes[i] == ContactMode::kOpen ||
+        (rolls && (kept == 0 || !segment->contacts[kept - 1].RollsBy(segment->contacts[i])))) {
       continue;
     }
     segment->contacts[kept] = segment->contacts[i];
@@ -275,7 +277,7 @@ Impulses* EventStepper::ListImpact(const Model<double>& model, double t, double 
         rattles ? std::max(slow, ReturnSpeed(model, state, touching_.contacts[i])) : slow;
     // Friction in a joint is a force, which does nothing at an instant.
     if (touching_.approach[i] > leaves || impacts_.Of(i) != group ||
-        touching_.contacts[i].IsJointFriction()) {
+        touching_.contacts[i].IsJointFriction() || LacksItsContact(i, impact.contacts)) {
       continue;
     }
     ActiveContact contact = touching_.contacts[i];
@@ -310,6 +312,7 @@ bool EventStepper::SolveImpact(const Model<double>& model, Impulses* impact, Sta
     outcome->message = "impact: " + WhatIsUnsolved(*model.structure, *impact, solved);
     return false;
   }
+  TakeRollingLimits(impact->solution, &impact->problem);
   solver_.system().MoveFactorsTo(&impact->system);
   const double before = KineticEnergy(model, state->twist);
   SpreadTwists(*model.structure, impact->solution.motion, &state->twist);
@@ -432,7 +435,7 @@ bool EventStepper::ChooseModes(const Model<double>& model, const State<double>& 
   for (size_t i = 0; i < touching_.contacts.size(); ++i) {
     bool is_open = touching_.approach[i] > slow;
     const double counted = SlipAtStart(i, slow, &is_open);
-    if (!is_open) {
+    if (!is_open && !LacksItsContact(i, segment->contacts)) {
       segment->contacts.push_back(touching_.contacts[i]);
       segment->friction.push_back(touching_.friction[i]);
       slip.push_back(counted);

@@ -98,6 +98,12 @@ class EventStepper {
   void FindTouching(const Model<double>& model, const State<double>& state);
   void AddTouching(const Model<double>& model, const State<double>& state,
                    const ActiveContact& contact);
+  /// Whether touching contact i is rolling friction of a contact that `contacts`, a list of those
+  /// before it, leaves out.
+  bool LacksItsContact(size_t i, const std::vector<ActiveContact>& contacts) const {
+    const ActiveContact& contact = touching_.contacts[i];
+    return contact.is_rolling && (contacts.empty() || !contacts.back().RollsBy(contact));
+  }
   /// At the start of a step: a joint limit among the touching contacts that has been violated for
   /// some steps without moving, although recovery would move it by `moved` in each; −1: none.
   int StuckLimit(const Model<double>& model, const State<double>& state, double moved);

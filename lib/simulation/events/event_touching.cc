@@ -24,6 +24,8 @@ void EventStepper::AddTouching(const Model<double>& model, const State<double>& 
   touching_.restitution.push_back(RestitutionOf(model, contact));
   touching_.approach.push_back(speeds.normal);
   touching_.slip.push_back(speeds.slip);
+  std::vector<ActiveContact> with_rolling = {contact};
+  if (AppendRolling(model, &with_rolling)) AddTouching(model, state, with_rolling.back());
 }
 
 namespace {

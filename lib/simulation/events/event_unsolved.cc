@@ -39,6 +39,7 @@ bool EventStepper::SolveByShortStep(const Model<double>& model, double t, double
     }
     return false;
   }
+  TakeRollingLimits(impulses.solution, &impulses.problem);
   solver_.system().MoveFactorsTo(&impulses.system);
   SpreadTwists(*model.structure, impulses.solution.motion, &state->twist);
   impulses.new_twist = state->twist;
@@ -106,7 +107,10 @@ bool EventStepper::HoldsTouching(const Model<double>& model, double t, State<dou
   impulses.friction.clear();
   const double slow = SlowSpeed(model, *state);
   for (size_t i = 0; i < touching_.contacts.size(); ++i) {
-    if (touching_.approach[i] > slow || touching_.contacts[i].IsJointFriction()) continue;
+    if (touching_.approach[i] > slow || touching_.contacts[i].IsJointFriction() ||
+        LacksItsContact(i, impulses.contacts)) {
+      continue;
+    }
     impulses.contacts.push_back(touching_.contacts[i]);
     impulses.friction.push_back(touching_.friction[i]);
   }

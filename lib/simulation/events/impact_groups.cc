@@ -62,7 +62,11 @@ void ImpactGroups::Split(const Model<double>& model, const State<double>& state,
   AssemblyScratch<double> scratch;
   AssembleWithoutContacts(model, state, t, 0.0, &problem, &scratch);
   AssembleContacts(model, state, 0.0, contacts, friction, restitution, &scratch, &problem);
-  const std::vector<int> parts = GroupsOfContacts(problem, wanted);
+  std::vector<int> parts = GroupsOfContacts(problem, wanted);
+  // Rolling friction acts with the impulse of its contact.
+  for (size_t k = 1; k < parts.size(); ++k) {
+    if (contacts[k].is_rolling) parts[k] = parts[k - 1];
+  }
   const int most = parts.empty() ? 0 : *std::max_element(parts.begin(), parts.end());
   if (most == 0 && !IsSplit(bodies)) return;
   for (const int body : structure_->moving) {

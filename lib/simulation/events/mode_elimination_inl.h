@@ -48,7 +48,9 @@ class ModeElimination {
     }
     for (size_t i = 0; i < p.contacts.size(); ++i) {
       if (row_of[i] >= 0) {
-        rhs[row_of[i]] = p.contacts[i].driven ? p.contacts[i].offset : -p.contacts[i].c_n;
+        rhs[row_of[i]] = p.contacts[i].rolls    ? T(0.0)
+                         : p.contacts[i].driven ? p.contacts[i].offset
+                                                : -p.contacts[i].c_n;
         if (modes[i] == ContactMode::kSticking) {
           rhs[row_of[i] + 1] = -p.contacts[i].c_t;
         }
@@ -81,7 +83,7 @@ class ModeElimination {
     out->tangent_impulse.assign(p.contacts.size(), T(0.0));
     for (size_t i = 0; i < p.contacts.size(); ++i) {
       if (row_of[i] >= 0) {
-        out->normal_impulse[i] = x[row_of[i]];
+        out->normal_impulse[i] = p.contacts[i].rolls ? out->normal_impulse[i - 1] : T(x[row_of[i]]);
         if (modes[i] == ContactMode::kSticking) {
           out->tangent_impulse[i] = x[row_of[i] + 1];
         }
@@ -142,7 +144,9 @@ class ModeElimination {
         add(at + 1, c.a, c.tangent_a, c.b, c.tangent_b);
         add_force(at + 1, c.a, c.tangent_a, c.b, c.tangent_b, T(1.0));
       } else {
-        add_force(at, c.a, c.tangent_a, c.b, c.tangent_b, T(-SlidingSign(modes[i]) * c.friction));
+        // A torque at its limit follows the normal impulse of the contact before it.
+        add_force(c.rolls ? row_of[i - 1] : at, c.a, c.tangent_a, c.b, c.tangent_b,
+                  T(-SlidingSign(modes[i]) * c.friction));
       }
     }
     return k;

@@ -146,6 +146,7 @@ bool SegmentFlow::Solve(const std::vector<ContactMode>& modes, SolvedNode* node)
   node->solution.modes = modes;
   const bool solved = mode_solve_.Solve(node->problem, nullptr, &node->system, &node->solution);
   counts_.whole_system += node->system.expansions() - before;
+  TakeRollingLimits(node->solution, &node->problem);
   return solved && AllFinite(node->solution.motion) && AllFinite(node->solution.joint_impulse) &&
          AllFinite(node->solution.normal_impulse) && AllFinite(node->solution.tangent_impulse);
 }
@@ -311,6 +312,7 @@ SegmentFlow::PoseErrors SegmentFlow::ErrorsOf(const Model<double>& model, const 
   for (size_t i = 0; i < node.problem.contacts.size(); ++i) {
     const ActiveContact& contact = segment.contacts[i];
     const double gap = node.problem.contacts[i].c_n;
+    if (contact.is_rolling) continue;
     if (contact.joint >= 0 && structure.joints[contact.joint].is_angular) {
       add_angle(gap, contact.a, contact.b);
     } else {
@@ -329,7 +331,7 @@ void SegmentFlow::LeaveRounding(const Segment& segment, SolvedNode* node) const 
   const auto is_far = [&](size_t i, double* left) {
     const ActiveContact& contact = segment.contacts[i];
     *left = kLeftAlone * lengths_.Rounding(node->state, contact.a, contact.b);
-    return contact.joint < 0 && contact.law != ContactLaw::kRecovery &&
+    return contact.IsOfShapes() && contact.law != ContactLaw::kRecovery &&
            *left > kLeastLeft * lengths_.Size(contact.a, contact.b);
   };
   double left;

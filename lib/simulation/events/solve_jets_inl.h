@@ -65,8 +65,10 @@ class ImplicitResidual {
     const int row = 3 * contact_block_[i];
     const double normal = s_.normal_impulse[i];
     AddRowTransposed(c.a, c.normal_a, c.b, c.normal_b, normal, load->data());
-    Set(row,
-        c.driven ? T(c.offset - normal) : T(-c.c_n - RowDot(c.a, c.normal_a, c.b, c.normal_b, v)));
+    // The normal impulse of rolling friction is no unknown of its own.
+    Set(row, c.rolls    ? T(0.0)
+             : c.driven ? T(c.offset - normal)
+                        : T(-c.c_n - RowDot(c.a, c.normal_a, c.b, c.normal_b, v)));
     const T slip = c.c_t + RowDot(c.a, c.tangent_a, c.b, c.tangent_b, v);
     T tangent(s_.tangent_impulse[i]);
     if (s_.modes[i] == ContactMode::kSticking) {
@@ -139,7 +141,8 @@ void SolveImplicitly(const ContactProblem<T>& problem, const ContactProblem<doub
   for (size_t i = 0; i < problem.contacts.size(); ++i) {
     if (block_of[i] >= 0) {
       const size_t row = 3 * static_cast<size_t>(block_of[i]);
-      out->normal_impulse[i] = jet(solution.normal_impulse[i], row);
+      out->normal_impulse[i] = problem.contacts[i].rolls ? out->normal_impulse[i - 1]
+                                                         : jet(solution.normal_impulse[i], row);
       if (solution.modes[i] == ContactMode::kSticking) {
         out->tangent_impulse[i] = jet(solution.tangent_impulse[i], row + 1);
       }
@@ -147,13 +150,51 @@ void SolveImplicitly(const ContactProblem<T>& problem, const ContactProblem<doub
   }
 }
 
-/// Every operation of the interior point; false where it does not converge.
+/// Every operation of the interior point; false where it does not converge. The limits of rolling
+/// friction are those of the last solution's normal impulses, first of `in_double`, until values
+/// and derivatives no longer change.
 template <typename T>
-bool SolveUnrolled(const ContactProblem<T>& problem, ContactSolution<T>* solution) {
+bool SolveUnrolled(const ContactProblem<T>& problem, const ContactSolution<double>& in_double,
+                   ContactSolution<T>* solution) {
   InteriorPointWorkspace<T> workspace;
   ContactInteriorPointOptions options;
   options.complementarity = kUnrolledComplementarity;
-  return SolveContactsByInteriorPoint(problem, options, &workspace, solution).converged;
+  if (!problem.has_rolling) {
+    return SolveContactsByInteriorPoint(problem, options, &workspace, solution).converged;
+  }
+  constexpr int kMostRounds = 30;
+  ContactProblem<T> given = problem;
+  given.has_rolling = false;
+  std::vector<T> normal(in_double.normal_impulse.begin(), in_double.normal_impulse.end());
+  for (int round = 0; round < kMostRounds; ++round) {
+    for (size_t i = 1; i < given.contacts.size(); ++i) {
+      ContactBlock<T>& block = given.contacts[i];
+      if (!problem.contacts[i].rolls) continue;
+      block.rolls = false;
+      block.offset = normal[i - 1];
+      block.has_friction = problem.contacts[i].has_friction && in_double.normal_impulse[i] > 0.0;
+    }
+    if (!SolveContactsByInteriorPoint(given, options, &workspace, solution).converged) return false;
+    double change = 0.0;
+    double size = 0.0;
+    for (size_t i = 1; i < given.contacts.size(); ++i) {
+      if (!problem.contacts[i].rolls) continue;
+      if constexpr (NumDerivatives<T>::value > 0) {
+        const T& next = solution->normal_impulse[i - 1];
+        const T difference = next - normal[i - 1];
+        const auto largest = [](const T& x) {
+          return std::max(std::abs(x.a), x.v.cwiseAbs().maxCoeff());
+        };
+        change = std::max(change, largest(difference));
+        size = std::max(size, largest(next));
+      } else {
+        change = HUGE_VAL;  // the derivatives of a tape are not known yet
+      }
+    }
+    normal = solution->normal_impulse;
+    if (change <= kRollingRounding * size) break;
+  }
+  return true;
 }
 
 }  // namespace tangible

@@ -158,6 +158,9 @@ inline constexpr double kUnrolledComplementarity = 1e-17;
 /// Of the largest speed: an unrolled impact that differs by more from the one in double is on
 /// another branch, or has stalled: its modes are eliminated instead.
 inline constexpr double kUnrolledAgrees = 1e-9;
+/// Of the largest impulse and derivative: the unrolled iteration on the limits of rolling friction
+/// ends where it changes them by less.
+inline constexpr double kRollingRounding = 1e-14;
 /// Of the derivatives: Newton's iteration for an event's time ends where it changes them by less.
 inline constexpr double kLocatedDerivative = 1e-12;
 /// Of the scales of impulse and slack: impulses and slacks below it count as 0; it lies two orders

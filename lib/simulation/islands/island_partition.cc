@@ -103,7 +103,7 @@ void IslandPartition::Divide(const Model<double>& model, const State<double>& st
       boxes_, [&](int i, int j) { return structure.MayCollide(i, j); }, &pairs_);
   closed_.clear();
   for (size_t i = 0; i < last.contacts.size(); ++i) {
-    if (last.contacts[i].joint < 0 && last.modes[i] != ContactMode::kOpen) {
+    if (last.contacts[i].IsOfShapes() && last.modes[i] != ContactMode::kOpen) {
       closed_.emplace_back(last.contacts[i].a, last.contacts[i].b);
     }
   }

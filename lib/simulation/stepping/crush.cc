@@ -16,13 +16,13 @@ int KinematicNeighbour(const ModelStructure& structure, const std::vector<Active
   DisjointSets sets;
   sets.AddAll(structure.bodies.size());
   for (const ActiveContact& c : contacts) {
-    if (c.joint < 0 && moves(c.a) && moves(c.b)) sets.Join(c.a, c.b);
+    if (c.IsOfShapes() && moves(c.a) && moves(c.b)) sets.Join(c.a, c.b);
   }
   const ActiveContact& worst = contacts[contact];
-  if (worst.joint >= 0) return -1;
+  if (!worst.IsOfShapes()) return -1;
   const int set = sets.Root(moves(worst.a) ? worst.a : worst.b);
   for (const ActiveContact& c : contacts) {
-    if (c.joint >= 0) continue;
+    if (!c.IsOfShapes()) continue;
     for (const auto& [own, other] : {std::pair(c.a, c.b), std::pair(c.b, c.a)}) {
       if (structure.bodies[own].motion == Motion::kKinematic && moves(other) &&
           sets.Root(other) == set) {

@@ -341,6 +341,7 @@ ContactSolverReport Stepper::SolveContacts(const ContactSolverOptions& options, 
   if (apart && islands_->Solve(record_.problem, options, &record_.solution, &report)) {
     *islands = islands_->count();
     factored_ = false;
+    TakeRollingLimits(record_.solution, &record_.problem);
     return report;
   }
   // The fallbacks of the islands count too.
@@ -348,6 +349,7 @@ ContactSolverReport Stepper::SolveContacts(const ContactSolverOptions& options, 
   fallbacks.islands_together += apart ? 1 : 0;
   report = solver_.Solve(record_.problem, options, &record_.solution);
   report.fallbacks.Add(fallbacks);
+  TakeRollingLimits(record_.solution, &record_.problem);
   return report;
 }
 
@@ -525,6 +527,7 @@ void Stepper::Refactor(const Model<double>& model, StepRecord* record) {
                           &scratch_);
   AssembleContacts(model, record->before, record->h, record->contacts, record->friction,
                    record->restitution, &scratch_, &record->problem);
+  TakeRollingLimits(record->solution, &record->problem);
   factored_ = true;
   solver_.system().Factor(record->problem, record->solution.modes);
 }

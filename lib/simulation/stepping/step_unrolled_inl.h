@@ -17,7 +17,7 @@ bool SolveUnrolled(const Model<T>& model, const StepRecord& record, State<T>* st
   ContactProblem<T> problem;
   AssembleInJets(model, record, *state, &problem);
   ContactSolution<T> solution;
-  const bool converged = SolveUnrolled(problem, &solution);
+  const bool converged = SolveUnrolled(problem, record.solution, &solution);
   SpreadTwists(*model.structure, solution.motion, &state->twist);
   MovePoses(*model.structure, record.h, state);
   return converged;
