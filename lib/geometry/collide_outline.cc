@@ -145,7 +145,7 @@ class OutlinePair {
         height = own;
         edge = i;
       }
-      if (own > of_allowed && IsAllowed(cone, line, own) && IsOverFace(line, v)) {
+      if (own > of_allowed && IsAllowed(cone, line) && IsOverFace(line, v)) {
         of_allowed = own;
         allowed = i;
       }
@@ -153,26 +153,28 @@ class OutlinePair {
     if (edge < 0) return false;
     const bool is_inside = height < 0.0 && other_.Size() > 2;
     if (!is_inside && edge != allowed) return IsOverFace(other_.Edge(edge), v);
-    if (allowed >= 0 && !IsTaken(foot, other_.Edge(allowed).length) && !IsTakenBefore(v, allowed)) {
+    if (allowed >= 0 && !IsTaken(foot, other_.Edge(allowed)) && !IsTakenBefore(v, allowed)) {
       Add(CornerOnEdge(corner, allowed), of_allowed - other_.Radius());
     }
     return true;
   }
 
-  // The second contact of faces that are nearly parallel counts too, where they are apart.
-  bool IsAllowed(const NormalCone& cone, const CoreEdge& line, double height) const {
+  // The second contact of faces that are nearly parallel counts too.
+  bool IsAllowed(const NormalCone& cone, const CoreEdge& line) const {
     const Vector2<double> direction = -line.Normal();
-    return outline_.IsPolygon() && height >= 0.0 ? cone.Faces(direction) : cone.Contains(direction);
+    return outline_.IsPolygon() ? cone.Faces(direction) : cone.Contains(direction);
   }
   static bool IsOverFace(const CoreEdge& line, const Vector2<double>& v) {
     const double s = line.tangent.dot(v - line.start);
     const double room = kLengthRounding * line.length;
     return s >= -room && s <= line.length + room;
   }
-  /// Whether a vertex of B above the corner is a contact already.
-  bool IsTaken(double foot, double length) const {
+  /// Whether a vertex of B's face above the corner is a contact already. A face of a polygon's
+  /// other body may face the edge that ends at the corner, and then has none on this one.
+  bool IsTaken(double foot, const CoreEdge& line) const {
+    if (outline_.IsPolygon() && -line.Normal().dot(of_.normal) <= kFacing) return false;
     return std::any_of(foot_, foot_ + num_on_run_, [&](double s) {
-      return std::abs(s - foot) <= kLengthRounding * (of_.length + length);
+      return std::abs(s - foot) <= kLengthRounding * (of_.length + line.length);
     });
   }
 

@@ -360,6 +360,26 @@ TEST(ConcavePolygonTest, DerivativesOfAllMethodsAgree) {
   }
 }
 
+// What stands on a box from the start on has nothing to do, by events either: its corners are in
+// line with the box's top, which the box's own corners far away are as well.
+TEST(ConcavePolygonTest, RestsOnABoxWithoutAnEvent) {
+  const std::vector<double> trough = {-0.156, -0.147, 0.156, -0.147, 0.156, 0.146, 0.07,   0.146,
+                                      0.07,   -0.043, -0.07, -0.043, -0.07, 0.146, -0.156, 0.146};
+  for (const char* stepping : {"fixed", "event"}) {
+    for (const double speed : {0.0, 1.3}) {
+      SCOPED_TRACE(stepping + std::string(" ") + Text(speed));
+      const RolledConcave run = RollConcave(
+          Meets(ShapeText(trough) + R"(, "inertia": 0.02, "position": [0, 0.147], "velocity": [)" +
+                    Text(speed) + ", 0]",
+                {ShapeText(R"("box": {"size": [20, 0.5]})") + R"(, "position": [0, -0.25])"},
+                {stepping, 0.2, 0.3}));
+      EXPECT_EQ(run.report.events, 0);
+      EXPECT_NEAR(run.final.pose[1], 0.147, 1e-11);
+      EXPECT_NEAR(run.final.pose[2], 0.0, 1e-11);
+    }
+  }
+}
+
 // Two angles meet in flight, without gravity: a leg's end of one in the notch of the other.
 TEST(ConcavePolygonTest, TwoMovingOnesKeepTheirMomentum) {
   for (const char* stepping : {"fixed", "event"}) {
