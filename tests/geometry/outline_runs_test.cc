@@ -178,7 +178,7 @@ TEST(OutlineRunsTest, TheNearestFeatureIsTheDistanceOfAShape) {
 }
 
 // Convex polygons that penetrate each other a little have the same contact as by their separating
-// axis, but for a few where two corners are in each other, of which each is nearest to another edge.
+// axis, but for a few where two corners are in each other, each of them nearest to another edge.
 TEST(OutlineRunsTest, ConvexPolygonsHaveTheContactOfTheirCores) {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> unit(0.0, 1.0);

@@ -41,7 +41,7 @@ void CoverContacts(const Scene& scene, const RunTrace& run, Coverage* coverage) 
         const bool is_point =
             is_point_of(c.a, c.feature.part_a) || is_point_of(c.b, c.feature.part_b);
         if (IsConcave(scene.bodies[c.a].shape) || IsConcave(scene.bodies[c.b].shape)) {
-          (*coverage)["contact of a concave polygon"] = 1;
+          (*coverage)["outline of a concave polygon"] = 1;
         }
         (*coverage)[is_point
                         ? "point fixed in a body"
@@ -158,7 +158,7 @@ std::vector<std::string> ExpectedCoverage() {
       }
     }
   }
-  expected.push_back("contact of a concave polygon");
+  expected.push_back("outline of a concave polygon");
   for (const auto& [name, type] : kJointTypeNames) {
     expected.push_back("joint " + std::string(name));
   }
