@@ -6,6 +6,7 @@
 #include <limits>
 #include <utility>
 
+#include "tangible/dynamics/elements/part_pairs.h"
 #include "tangible/dynamics/jacobian/contact_gradient.h"
 #include "tangible/geometry/mass_properties.h"
 #include "tangible/simulation/events/tolerances.h"
@@ -29,7 +30,7 @@ bool FindNearest(const Model<double>& model, const State<double>& state, const O
   const int a = std::min(event.bodies[0], event.bodies[1]);
   const int b = std::max(event.bodies[0], event.bodies[1]);
   bool any = false;
-  model.structure->ForEachPartPair(a, b, [&](PartPair parts) {
+  ForEachPart(model, a, b, [&](PartPair parts) {
     ContactFeature features[2];
     const int count = FindFeatures(model, a, state.PoseOf(a), b, state.PoseOf(b), parts,
                                    std::numeric_limits<double>::infinity(), features);

@@ -2,6 +2,8 @@
 //
 // The features of a run of an outline and another shape, B. All places are in the outline's frame.
 
+#include "tangible/geometry/collide_outline.h"
+
 #include <algorithm>
 #include <cmath>
 
@@ -14,25 +16,6 @@
 
 namespace tangible::internal {
 namespace {
-
-Pose<double> RelativeTo(const Pose<double>& frame, const Pose<double>& pose) {
-  Pose<double> relative;
-  relative.position = frame.Inverse(pose.position);
-  relative.angle = pose.angle - frame.angle;
-  relative.rotation.cosine =
-      frame.rotation.cosine * pose.rotation.cosine + frame.rotation.sine * pose.rotation.sine;
-  relative.rotation.sine =
-      frame.rotation.cosine * pose.rotation.sine - frame.rotation.sine * pose.rotation.cosine;
-  return relative;
-}
-
-double DistanceOfSegment(const Vector2<double>& start, const Vector2<double>& end,
-                         const Vector2<double>& x) {
-  const Vector2<double> along = end - start;
-  const double square = along.squaredNorm();
-  const double share = square > 0.0 ? std::clamp(along.dot(x - start) / square, 0.0, 1.0) : 0.0;
-  return (x - start - share * along).norm();
-}
 
 class OutlinePair {
  public:
@@ -57,15 +40,6 @@ class OutlinePair {
   }
 
  private:
-  /// The normals of a corner, counter-clockwise.
-  struct Cone {
-    Vector2<double> first, last;
-    bool Contains(const Vector2<double>& direction) const {
-      return Cross(first, direction) >= -kFlushTurn && Cross(direction, last) >= -kFlushTurn &&
-             direction.dot(first + last) > 0.0;
-    }
-  };
-
   ContactFeature OnEdge(int edge, int vertex) const {
     return is_first_ ? ContactFeature{FeatureKind::kEdgeVertex, edge, vertex}
                      : ContactFeature{FeatureKind::kVertexEdge, vertex, edge};
@@ -121,8 +95,8 @@ class OutlinePair {
 
   void TryStart() {
     const int previous = of_.before == OutlineJoint::kConvex ? outline_.Previous(run_) : -1;
-    const Cone cone{previous >= 0 ? outline_.run(previous).normal : Vector2<double>(-of_.tangent),
-                    of_.normal};
+    const NormalCone cone{
+        previous >= 0 ? outline_.run(previous).normal : Vector2<double>(-of_.tangent), of_.normal};
     Try(of_.first, of_.start, cone, 0.0, [&](const Vector2<double>& x) {
       const bool is_beyond = of_.tangent.dot(x - of_.start) < 0.0 && HeightOf(x) >= 0.0;
       return !outline_.IsAfterStart(run_, x) &&
@@ -131,7 +105,7 @@ class OutlinePair {
   }
 
   void TryEnd() {
-    const Vector2<double> end = of_.start + of_.length * of_.tangent;
+    const Vector2<double> end = outline_.EndPlace(run_);
     Try(of_.last + 1, end, {of_.normal, of_.tangent}, of_.length, [&](const Vector2<double>& x) {
       return !outline_.IsBeforeEnd(run_, x) && HeightOf(x) >= 0.0;
     });
@@ -140,7 +114,7 @@ class OutlinePair {
   /// Adds the contact of the corner v with B. `is_beyond` says whether a point is in the cone: the
   /// same tests as those of the runs, so that rounding leaves out none and takes none twice.
   template <typename IsBeyond>
-  void Try(int corner, const Vector2<double>& v, const Cone& cone, double foot,
+  void Try(int corner, const Vector2<double>& v, const NormalCone& cone, double foot,
            const IsBeyond& is_beyond) {
     if (is_ellipse_) return TryEllipse(corner, v, cone);
     if (other_.Size() > 1 && TryFaces(corner, v, cone, foot)) return;
@@ -160,7 +134,7 @@ class OutlinePair {
 
   /// The corner against the face of B that separates them best. Where it is in B, it is the best
   /// one whose normal the corner has. False where the vertices of B are nearer.
-  bool TryFaces(int corner, const Vector2<double>& v, const Cone& cone, double foot) {
+  bool TryFaces(int corner, const Vector2<double>& v, const NormalCone& cone, double foot) {
     int edge = -1, allowed = -1;
     double height = -kInfinity, of_allowed = -kInfinity;
     for (int i = 0; i < other_.Size(); ++i) {
@@ -171,7 +145,7 @@ class OutlinePair {
         height = own;
         edge = i;
       }
-      if (own > of_allowed && cone.Contains(-line.Normal()) && IsOverFace(line, v)) {
+      if (own > of_allowed && IsAllowed(cone, line) && IsOverFace(line, v)) {
         of_allowed = own;
         allowed = i;
       }
@@ -179,25 +153,47 @@ class OutlinePair {
     if (edge < 0) return false;
     const bool is_inside = height < 0.0 && other_.Size() > 2;
     if (!is_inside && edge != allowed) return IsOverFace(other_.Edge(edge), v);
-    if (allowed >= 0 && !IsTaken(foot, other_.Edge(allowed).length)) {
+    if (allowed >= 0 && !IsTaken(foot, other_.Edge(allowed)) && !IsTakenBefore(v, allowed)) {
       Add(CornerOnEdge(corner, allowed), of_allowed - other_.Radius());
     }
     return true;
   }
 
+  // The second contact of faces that are nearly parallel counts too.
+  bool IsAllowed(const NormalCone& cone, const CoreEdge& line) const {
+    const Vector2<double> direction = -line.Normal();
+    return outline_.IsPolygon() ? cone.Faces(direction) : cone.Contains(direction);
+  }
   static bool IsOverFace(const CoreEdge& line, const Vector2<double>& v) {
     const double s = line.tangent.dot(v - line.start);
     const double room = kLengthRounding * line.length;
     return s >= -room && s <= line.length + room;
   }
-  /// Whether a vertex of B above the corner is a contact already.
-  bool IsTaken(double foot, double length) const {
+  /// Whether a vertex of B's face above the corner is a contact already. A face of a polygon's
+  /// other body may face the edge that ends at the corner, and then has none on this one.
+  bool IsTaken(double foot, const CoreEdge& line) const {
+    if (outline_.IsPolygon() && -line.Normal().dot(of_.normal) <= kFacing) return false;
     return std::any_of(foot_, foot_ + num_on_run_, [&](double s) {
-      return std::abs(s - foot) <= kLengthRounding * (of_.length + length);
+      return std::abs(s - foot) <= kLengthRounding * (of_.length + line.length);
     });
   }
 
-  void TryEllipse(int corner, const Vector2<double>& v, const Cone& cone) {
+  /// Whether a vertex of B's face above the corner is a contact of the run that ends there.
+  bool IsTakenBefore(const Vector2<double>& v, int edge) const {
+    if (!outline_.IsPolygon()) return false;
+    const int previous = outline_.Previous(run_);
+    const OutlineRun& before = outline_.run(previous);
+    const CoreEdge line = other_.Edge(edge);
+    const double room = kLengthRounding * (before.length + line.length);
+    if (-line.Normal().dot(before.normal) <= kFacing) return false;
+    const int ends[2] = {edge, other_.Next(edge)};
+    return std::any_of(ends, ends + 2, [&](int i) {
+      const Vector2<double> x = other_.VertexAt(i);
+      return std::abs(before.tangent.dot(x - v)) <= room && outline_.IsOver(previous, x);
+    });
+  }
+
+  void TryEllipse(int corner, const Vector2<double>& v, const NormalCone& cone) {
     const double point[2] = {v.x(), v.y()};
     const ShapeView<double> of_corner{ShapeType::kPolygon, point, 2};
     const ContactGeometry<double> contact = EvaluateContact(
@@ -237,13 +233,27 @@ int FindOutlineFeatures(const Outline& outline, int run, const ShapeView<double>
   return internal::OutlinePair(outline, run, other, relative, side).Find(max_gap, features);
 }
 
+int FindHullFeatures(const Outline& outline, const ShapeView<double>& plane,
+                     const Pose<double>& pose_a, const Pose<double>& pose_b, SeamSide side,
+                     double max_gap, ContactFeature features[2]) {
+  const bool is_first = side == SeamSide::kFirst;
+  const ShapeView<double> hull = outline.Hull();
+  const int count = FindContactFeatures(is_first ? hull : plane, pose_a, is_first ? plane : hull,
+                                        pose_b, max_gap, features);
+  for (int k = 0; k < count; ++k) {
+    int& vertex = is_first ? features[k].a : features[k].b;
+    vertex = outline.VertexOfHull(vertex);
+  }
+  return count;
+}
+
 double DistanceOfRun(const Outline& outline, int run, const Pose<double>& pose,
                      const ShapeView<double>& shape, const Pose<double>& shape_pose, int* corner,
                      int* vertex) {
   const OutlineRun& of = outline.run(run);
   const Pose<double> relative = internal::RelativeTo(pose, shape_pose);
   const internal::ConvexCore core(shape, relative, Vector2<double>(0.0, 0.0));
-  const Vector2<double> ends[2] = {of.start, of.start + of.length * of.tangent};
+  const Vector2<double> ends[2] = {of.start, outline.EndPlace(run)};
   double best = kInfinity;
   double nearest = kInfinity;
   for (int j = 0; j < core.Size(); ++j) {
@@ -253,7 +263,7 @@ double DistanceOfRun(const Outline& outline, int run, const Pose<double>& pose,
       const double square = (x - ends[k]).squaredNorm();
       if (square < nearest) {
         nearest = square;
-        *corner = k == 0 ? of.first : of.last + 1;
+        *corner = k == 0 ? of.first : outline.EndOf(run);
         *vertex = j;
       }
     }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "tangible/geometry/tolerances.h"
 #include "tangible/math/scalar.h"
@@ -30,13 +31,27 @@ void Include(const Vector2<double>& point, Aabb* box) {
 
 }  // namespace
 
-Outline::Outline(const ShapeView<double>& polyline) {
-  const int num_edges = NumVertices(polyline.type, polyline.num_numbers) - 1;
-  is_closed_ = Vertex(polyline, 0) == Vertex(polyline, num_edges);
-  along_.resize(static_cast<size_t>(num_edges));
-  for (int i = 0; i < num_edges; ++i) {
-    const Vector2<double> start = Vertex(polyline, i);
-    const Vector2<double> along = Vertex(polyline, i + 1) - start;
+bool IsConcavePolygon(const ShapeView<double>& shape) {
+  if (shape.type != ShapeType::kPolygon) return false;
+  const int size = NumVertices(shape.type, shape.num_numbers);
+  for (int i = 0; i < size; ++i) {
+    const Vector2<double> at = Vertex(shape, (i + 1) % size);
+    const Vector2<double> in = at - Vertex(shape, i);
+    const Vector2<double> out = Vertex(shape, (i + 2) % size) - at;
+    if (Cross(in, out) < -kFlushTurn * in.norm() * out.norm()) return true;
+  }
+  return false;
+}
+
+Outline::Outline(const ShapeView<double>& shape) {
+  is_polygon_ = shape.type == ShapeType::kPolygon;
+  const int num_points = NumVertices(shape.type, shape.num_numbers);
+  num_edges_ = is_polygon_ ? num_points : num_points - 1;
+  is_closed_ = is_polygon_ || Vertex(shape, 0) == Vertex(shape, num_edges_);
+  along_.resize(static_cast<size_t>(num_edges_));
+  for (int i = 0; i < num_edges_; ++i) {
+    const Vector2<double> start = Vertex(shape, i);
+    const Vector2<double> along = Vertex(shape, (i + 1) % num_points) - start;
     const double length = std::sqrt(along.squaredNorm());
     const Vector2<double> tangent = along / length;
     if (i > 0 && std::abs(Cross(runs_.back().tangent, tangent)) <= kFlushTurn &&
@@ -56,7 +71,8 @@ Outline::Outline(const ShapeView<double>& polyline) {
     along_[static_cast<size_t>(i)] = 0.0;
   }
   SetJoints();
-  BuildTree(polyline);
+  BuildTree(shape);
+  if (is_polygon_) BuildHull(shape);
 }
 
 void Outline::SetJoints() {
@@ -77,13 +93,14 @@ void Outline::SetJoints() {
   }
 }
 
-void Outline::BuildTree(const ShapeView<double>& polyline) {
+void Outline::BuildTree(const ShapeView<double>& shape) {
+  const int num_points = NumVertices(shape.type, shape.num_numbers);
   while (num_leaves_ < num_runs()) num_leaves_ *= 2;
   tree_.assign(2 * static_cast<size_t>(num_leaves_),
                {kInfinity, kInfinity, -kInfinity, -kInfinity});
   for (int i = 0; i < num_runs(); ++i) {
     for (int k = runs_[i].first; k <= runs_[i].last + 1; ++k) {
-      Include(Vertex(polyline, k), &tree_[static_cast<size_t>(num_leaves_ + i)]);
+      Include(Vertex(shape, k % num_points), &tree_[static_cast<size_t>(num_leaves_ + i)]);
     }
   }
   for (int node = num_leaves_ - 1; node > 0; --node) {
@@ -93,6 +110,51 @@ void Outline::BuildTree(const ShapeView<double>& polyline) {
         std::min(low.min_x, high.min_x), std::min(low.min_y, high.min_y),
         std::max(low.max_x, high.max_x), std::max(low.max_y, high.max_y)};
   }
+}
+
+// The lower chain from the leftmost vertex and the upper one back to it (Andrew's algorithm).
+// Vertices within rounding of a side belong to no corner of the hull.
+void Outline::BuildHull(const ShapeView<double>& shape) {
+  const int size = NumVertices(shape.type, shape.num_numbers);
+  std::vector<int> order(static_cast<size_t>(size));
+  std::iota(order.begin(), order.end(), 0);
+  std::sort(order.begin(), order.end(), [&](int i, int j) {
+    const Vector2<double> x = Vertex(shape, i), y = Vertex(shape, j);
+    return x.x() < y.x() || (x.x() == y.x() && x.y() < y.y());
+  });
+  const auto turns_left = [&](int i, int j, int k) {
+    const Vector2<double> in = Vertex(shape, j) - Vertex(shape, i);
+    const Vector2<double> out = Vertex(shape, k) - Vertex(shape, j);
+    return Cross(in, out) > kLengthRounding * in.norm() * out.norm();
+  };
+  const auto add = [&](int vertex, size_t least) {
+    while (hull_.size() > least && !turns_left(hull_[hull_.size() - 2], hull_.back(), vertex)) {
+      hull_.pop_back();
+    }
+    hull_.push_back(vertex);
+  };
+  for (const int vertex : order) add(vertex, 1);
+  const size_t lower = hull_.size();
+  for (size_t i = order.size() - 1; i-- > 0;) add(order[i], lower);
+  hull_.pop_back();
+  for (const int vertex : hull_) {
+    const Vector2<double> x = Vertex(shape, vertex);
+    hull_numbers_.insert(hull_numbers_.end(), {x.x(), x.y()});
+  }
+}
+
+// The edges that a ray towards +x crosses are counted, of two that meet at its height one.
+bool Outline::Contains(const Vector2<double>& x) const {
+  bool is_in = false;
+  ForEachRun({x.x(), x.y(), kInfinity, x.y()}, [&](int i) {
+    const OutlineRun& run = runs_[i];
+    const Vector2<double>& end = runs_[Next(i)].start;
+    if ((run.start.y() > x.y()) == (end.y() > x.y())) return;
+    // Of a run that goes up the left side is the inner one.
+    const bool is_left = HeightOver(run, x) < 0.0;
+    if (is_left == (end.y() > run.start.y())) is_in = !is_in;
+  });
+  return is_in;
 }
 
 int Outline::EdgeAt(int run, double s) const {
@@ -111,7 +173,7 @@ bool Outline::IsAfterStart(int run, const Vector2<double>& x) const {
   }
   if (of.before != OutlineJoint::kConcave) return false;
   const OutlineRun& previous = runs_[Previous(run)];
-  return HeightOver(previous, x) <= 0.0 && FootOver(previous, x) >= 0.0;
+  return HeightOver(previous, x) <= 0.0 && FootOver(previous, x) >= 0.0 && MayContain(x);
 }
 
 bool Outline::IsBeforeEnd(int run, const Vector2<double>& x) const {
@@ -123,7 +185,7 @@ bool Outline::IsBeforeEnd(int run, const Vector2<double>& x) const {
   }
   if (of.after != OutlineJoint::kConcave) return false;
   const OutlineRun& next = runs_[Next(run)];
-  return HeightOver(next, x) <= 0.0 && FootOver(next, x) <= next.length;
+  return HeightOver(next, x) <= 0.0 && FootOver(next, x) <= next.length && MayContain(x);
 }
 
 // Whether a point at some depth behind a run is on the free side of another one that is nearer.
@@ -138,10 +200,28 @@ bool Outline::IsBehindFree(int run, const Vector2<double>& x, double depth) cons
   return is_free;
 }
 
+// Whether a point at some depth behind a run of a polygon is in the solid, and over no other run
+// with a smaller depth. At a concave joint both runs bound the free side.
+bool Outline::IsNearest(int run, const Vector2<double>& x, double depth) const {
+  if (!Contains(x)) return false;
+  const OutlineRun& of = runs_[run];
+  const int before = of.before == OutlineJoint::kConcave ? Previous(run) : run;
+  const int after = of.after == OutlineJoint::kConcave ? Next(run) : run;
+  bool is_nearest = true;
+  ForEachRun({x.x() - depth, x.y() - depth, x.x() + depth, x.y() + depth}, [&](int i) {
+    if (i == run || i == before || i == after || !is_nearest) return;
+    const double other = -HeightOver(runs_[i], x);
+    const bool is_nearer = other >= 0.0 && (other < depth || (other == depth && i < run));
+    if (is_nearer && IsAfterStart(i, x) && IsBeforeEnd(i, x)) is_nearest = false;
+  });
+  return is_nearest;
+}
+
 bool Outline::IsOver(int run, const Vector2<double>& x) const {
   if (!IsAfterStart(run, x) || !IsBeforeEnd(run, x)) return false;
   const double h = HeightOver(runs_[run], x);
-  return h >= -kFlushStep || !IsBehindFree(run, x, -h);
+  if (h >= -kFlushStep) return true;
+  return is_polygon_ ? IsNearest(run, x, -h) : !IsBehindFree(run, x, -h);
 }
 
 Aabb BoxOfOutline(const Outline& outline, const Pose<double>& pose, double margin) {

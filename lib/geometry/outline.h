@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Polylines: outlines of a solid, which other bodies touch from the free side alone.
+// Polylines and concave polygons: outlines of a solid, which other bodies touch from the free side
+// alone.
 //
 // Going along the points the solid is on the left, so that the normal n of an edge with the
 // tangent t is (t_y, −t_x), as of a counter-clockwise polygon. A joint of two edges that turn
@@ -18,6 +19,10 @@
 // concave joint it is also where it is behind the neighbour, because near the joint both bound
 // the free side. A point behind a run that is over another run with a smaller height above it
 // is on the free side of a thin solid, and no contact of the first one.
+//
+// A polygon bounds its solid on all sides, so that more is known: a point behind a run touches it
+// only if it is in the polygon, and of the runs that it is over only the nearest one, or two that
+// meet at a concave joint. What is deep in the solid is pushed out through the nearest edge.
 
 #include <vector>
 
@@ -37,11 +42,31 @@ struct OutlineRun {
   double bisector_before = 0.0, bisector_after = 0.0;  ///< tan(turn / 2) of convex joints
 };
 
-/// A polyline in its body's frame.
+/// Whether a shape is a polygon with a corner that turns inward, by more than kFlushTurn.
+bool IsConcavePolygon(const ShapeView<double>& shape);
+
+/// A polyline or a polygon in its body's frame.
 class Outline {
  public:
-  /// O(n) for n points, no two of which that follow each other are equal.
-  explicit Outline(const ShapeView<double>& polyline);
+  /// O(n) for n points, no two of which that follow each other are equal; O(n log n) of a polygon.
+  explicit Outline(const ShapeView<double>& shape);
+
+  bool IsPolygon() const { return is_polygon_; }
+  /// The convex hull of a polygon, which is what a half-plane touches: a convex polygon, and which
+  /// vertex of the outline each of its vertices is.
+  ShapeView<double> Hull() const {
+    return {ShapeType::kPolygon, hull_numbers_.data(), static_cast<int>(hull_numbers_.size())};
+  }
+  int VertexOfHull(int i) const { return hull_[static_cast<size_t>(i)]; }
+  /// Whether a point is in a polygon. O(log n + the edges beside it).
+  bool Contains(const Vector2<double>& x) const;
+  /// The vertex at which a run ends, and its place.
+  int EndOf(int run) const {
+    return is_polygon_ && runs_[run].last + 1 == num_edges_ ? 0 : runs_[run].last + 1;
+  }
+  Vector2<double> EndPlace(int run) const {
+    return runs_[run].start + runs_[run].length * runs_[run].tangent;
+  }
 
   int num_runs() const { return static_cast<int>(runs_.size()); }
   const OutlineRun& run(int i) const { return runs_[i]; }
@@ -82,12 +107,19 @@ class Outline {
     VisitNode(2 * node + 1, middle, high, box, visit);
   }
   bool IsBehindFree(int run, const Vector2<double>& x, double depth) const;
+  /// What is behind a run of an open line may be anywhere in the solid.
+  bool MayContain(const Vector2<double>& x) const { return !is_polygon_ || Contains(x); }
+  bool IsNearest(int run, const Vector2<double>& x, double depth) const;
   void SetJoints();
-  void BuildTree(const ShapeView<double>& polyline);
+  void BuildTree(const ShapeView<double>& shape);
+  void BuildHull(const ShapeView<double>& shape);
 
   std::vector<OutlineRun> runs_;
   std::vector<double> along_;  ///< the foot of each edge's start over its run
-  bool is_closed_ = false;
+  int num_edges_ = 0;
+  bool is_closed_ = false, is_polygon_ = false;
+  std::vector<int> hull_;
+  std::vector<double> hull_numbers_;
   int num_leaves_ = 1;      ///< a power of two
   std::vector<Aabb> tree_;  ///< a heap whose leaves are the boxes of the runs
 };
@@ -102,6 +134,27 @@ int FindOutlineFeatures(const Outline& outline, int run, const ShapeView<double>
                         const Pose<double>& pose_a, const ShapeView<double>& shape_b,
                         const Pose<double>& pose_b, SeamSide side, double max_gap,
                         ContactFeature features[2]);
+
+/// The same for the convex hull of a polygon and a half-plane.
+int FindHullFeatures(const Outline& outline, const ShapeView<double>& plane,
+                     const Pose<double>& pose_a, const Pose<double>& pose_b, SeamSide side,
+                     double max_gap, ContactFeature features[2]);
+
+/// A run of an outline at a pose.
+struct PlacedRun {
+  const Outline& outline;
+  int run;
+  const Pose<double>& pose;
+  const OutlineRun& of() const { return outline.run(run); }
+};
+
+/// The same for the runs of two outlines: the corner at which each starts (and ends, where nothing
+/// follows) over the other one, and two such corners where neither is over the other's run.
+int FindFeaturesOfRuns(const PlacedRun& a, const PlacedRun& b, double max_gap,
+                       ContactFeature features[2]);
+
+/// The distance of two runs that do not cross, m. Sets the ends that are nearest.
+double DistanceOfRuns(const PlacedRun& a, const PlacedRun& b, int* end_a, int* end_b);
 
 /// A lower bound of the distance of a run and a shape that do not cross, less the shape's radius,
 /// m; the distance itself unless the shape is an ellipse. Sets the end of the run and the vertex of

@@ -42,7 +42,7 @@ function toBody(pose, point) {
   return [c * x + s * y, c * y - s * x];
 }
 
-// Vertices of the convex core and the radius it is grown by; null for a half-plane and no shape.
+// Vertices of the shape's core and the radius it is grown by; null for a half-plane and no shape.
 function coreOf(body) {
   const n = body.numbers;
   switch (body.shape) {
@@ -67,10 +67,12 @@ function insideBody(body, pose, point) {
   if (body.shape === "polyline") return false;
   const {points, radius} = body.core;
   if (points.length > 2) {
-    return points.every((a, i) => {
+    // A ray towards +x crosses the outline an odd number of times.
+    return points.reduce((inside, a, i) => {
       const b = points[(i + 1) % points.length];
-      return (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]) >= 0;
-    });
+      if ((a[1] > p[1]) === (b[1] > p[1])) return inside;
+      return p[0] < a[0] + (p[1] - a[1]) / (b[1] - a[1]) * (b[0] - a[0]) ? !inside : inside;
+    }, false);
   }
   const a = points[0], d = points.length === 2 ? [points[1][0] - a[0], points[1][1] - a[1]] : [0, 0];
   const length2 = d[0] * d[0] + d[1] * d[1];

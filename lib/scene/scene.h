@@ -27,7 +27,7 @@ enum class SolidSide { kLeft, kRight };
 ///   kBox       width, height
 ///   kEllipse   semi-axes along body x and y
 ///   kCapsule   length between the cap centres (along body x), radius
-///   kPolygon   x0, y0, x1, y1, ...: convex, counter-clockwise
+///   kPolygon   x0, y0, x1, y1, ...: counter-clockwise, convex or not
 ///   kPolyline  x0, y0, x1, y1, ...: as in the file
 ///   kHalfPlane normal x, normal y, offset: solid where normal·r ≤ offset; not necessarily unit
 template <typename T>

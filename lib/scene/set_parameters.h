@@ -17,7 +17,7 @@ bool CheckApart(const Scene& scene, const std::vector<ParameterPath>& parameters
 
 /// Sets all numbers of each parameter to its value, values[k] that of parameters[k]. Returns empty,
 /// or one line "bodies/ball/mass: expected a number > 0, got -1", the scene then half set: where a
-/// value is not allowed, or the scene with all of them (a polygon that is not convex any longer,
+/// value is not allowed, or the scene with all of them (a polygon that crosses itself,
 /// limits that cross).
 std::string SetParameters(const std::vector<ParameterPath>& parameters, const double* values,
                           Scene* scene);

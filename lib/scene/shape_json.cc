@@ -119,39 +119,42 @@ void RefuseOutline(const JsonReader& vertices, const Points& points, const JsonR
   if (!RefuseCrossing(vertices, points, static_cast<int>(points.size()))) place.Fail(message);
 }
 
-// A polygon is convex and counter-clockwise if every corner turns left and all turns add up to one
-// full turn (a pentagram's add up to two). Linear in the vertices where nothing is wrong.
+// A polygon is counter-clockwise and does not cross itself. It is convex if every corner turns left
+// and all turns add up to one full turn (a pentagram's add up to two), which takes a time linear in
+// the vertices; crossings are looked for where a corner turns right.
 void CheckPolygon(const JsonReader& vertices, const std::vector<double>& numbers) {
   const Points points = Scaled(numbers);
   const std::size_t size = points.size();
   for (std::size_t i = 0; i < size; ++i) {
     if (points[i] != points[(i + size - 1) % size]) continue;
     return vertices.At(static_cast<int>(i))
-        .Fail("expected a convex polygon, got the same vertex twice");
+        .Fail("expected a polygon of different vertices, got the same vertex twice");
   }
   if (DoubleArea(points) < -kStraightCorner) {
     return RefuseOutline(vertices, points, vertices,
                          "expected counter-clockwise vertices, got clockwise ones");
   }
   double turn = 0.0;
+  bool is_concave = false;
   for (std::size_t i = 0; i < size; ++i) {
     const Vector2<double> in = points[i] - points[(i + size - 1) % size];
     const Vector2<double> out = points[(i + 1) % size] - points[i];
     const double sine = Cross(in, out);
     const double bound = kStraightCorner * in.norm() * out.norm();
     const JsonReader corner = vertices.At(static_cast<int>(i));
-    if (sine < -bound) {
-      return RefuseOutline(vertices, points, corner,
-                           "expected a convex polygon, got a corner that turns inward");
+    if (std::abs(sine) <= bound) {
+      return corner.Fail("expected a corner, got a vertex on the line of its neighbours");
     }
-    if (sine <= bound) {
-      return corner.Fail("expected a convex polygon, got a vertex on the line of its neighbours");
-    }
+    is_concave = is_concave || sine < 0.0;
     turn += std::atan2(sine, in.dot(out));
   }
   if (turn > 3.0 * kPi) {
-    RefuseOutline(vertices, points, vertices,
-                  "expected a convex polygon, got one that goes around more than once");
+    return RefuseOutline(vertices, points, vertices,
+                         "expected an outline that goes around once, got one that does so twice");
+  }
+  if (is_concave && !RefuseCrossing(vertices, points, static_cast<int>(size)) &&
+      DoubleArea(points) <= kStraightCorner) {
+    vertices.Fail("expected an outline that encloses an area, got none");
   }
 }
 

@@ -213,8 +213,10 @@ TEST(BadSceneTest, Shapes) {
        shape + "/polygon/vertices: expected an array of at least 3 points, got an array of 2"},
       {shape, R"({"polygon": {"vertices": [[0, 0], [0, 1], [1, 0]]}})",
        shape + "/polygon/vertices: expected counter-clockwise vertices, got clockwise ones"},
-      {shape, R"({"polygon": {"vertices": [[0, 0], [2, 0], [0.5, 0.5], [0, 2]]}})",
-       shape + "/polygon/vertices/2: expected a convex polygon, got a corner that turns inward"},
+      {shape, R"({"polygon": {"vertices": [[0, 0], [2, 0], [0.5, 0.5], [0, 2], [0.2, -1]]}})",
+       shape +
+           "/polygon/vertices: expected an outline that does not cross or touch itself, got the "
+           "edge of vertices 0 and 1 that meets the edge of vertices 3 and 4"},
       {shape, R"({"half_plane": {"normal": [0, 1], "offset": 0}})",
        shape + "/half_plane: expected a static or kinematic body, got a moving one"},
       {"/bodies/3/shape/half_plane/normal", "[0, 0]",

@@ -128,7 +128,7 @@ TEST(SceneToJsonTest, RoundTripBitForBit) {
   std::mt19937_64 random(3);
   std::uniform_real_distribution<double> uniform(0.1, 0.9);
   for (const auto& number : EnumerateNumbers(&scene)) {
-    // The shape must stay convex and the limits in order.
+    // The outline must not cross itself and the limits in order.
     if (number.path.find("vertices") != std::string::npos) continue;
     if (number.path.find("limits/0") != std::string::npos) continue;
     if (number.path.find("/start") != std::string::npos) continue;

@@ -3,6 +3,7 @@
 
 #include <utility>
 
+#include "tangible/geometry/outline.h"
 #include "tangible/scene/scene_names.h"
 #include "tangible/simulation/stepping/step.h"
 #include "tangible/verification/support/coincidences.h"
@@ -17,6 +18,11 @@ std::string PairName(ShapeType a, ShapeType b) {
   return "contact " + NameOf(a, kShapeTypeNames) + ", " + NameOf(b, kShapeTypeNames);
 }
 
+bool IsConcave(const BasicShape<double>& shape) {
+  return IsConcavePolygon(
+      {shape.type, shape.numbers.data(), static_cast<int>(shape.numbers.size())});
+}
+
 void CoverContacts(const Scene& scene, const RunTrace& run, Coverage* coverage) {
   for (const std::vector<ContactTrace>& step : run.steps) {
     for (const ContactTrace& trace : step) {
@@ -28,7 +34,15 @@ void CoverContacts(const Scene& scene, const RunTrace& run, Coverage* coverage) 
       if (c.joint >= 0) {
         (*coverage)["limit of a " + NameOf(scene.joints[c.joint].type, kJointTypeNames)] = 1;
       } else {
-        const bool is_point = c.feature.part_a > 0 || c.feature.part_b > 0;
+        // The parts after a body's contact points are edges of its outline.
+        const auto is_point_of = [&](int body, int part) {
+          return part > 0 && part <= static_cast<int>(scene.bodies[body].contact_points.size());
+        };
+        const bool is_point =
+            is_point_of(c.a, c.feature.part_a) || is_point_of(c.b, c.feature.part_b);
+        if (IsConcave(scene.bodies[c.a].shape) || IsConcave(scene.bodies[c.b].shape)) {
+          (*coverage)["outline of a concave polygon"] = 1;
+        }
         (*coverage)[is_point
                         ? "point fixed in a body"
                         : PairName(scene.bodies[c.a].shape.type, scene.bodies[c.b].shape.type)] = 1;
@@ -145,6 +159,7 @@ std::vector<std::string> ExpectedCoverage() {
       }
     }
   }
+  expected.push_back("outline of a concave polygon");
   for (const auto& [name, type] : kJointTypeNames) {
     expected.push_back("joint " + std::string(name));
   }

@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <string>
+#include <vector>
 
 #include "tangible/scene/coupling.h"
 #include "tangible/scene/joint_graph.h"
@@ -364,6 +366,68 @@ void SceneMaker::Outlines() {
                                          random.Uniform(-1.1, 0.8) * height);
       }
     }
+  }
+}
+
+namespace {
+
+double HalfWidth(const BasicShape<double>& shape) {
+  switch (shape.type) {
+    case ShapeType::kBox:
+      return 0.5 * shape.numbers[0];
+    case ShapeType::kCapsule:
+      return 0.5 * shape.numbers[0] + shape.numbers[1];
+    case ShapeType::kPolygon: {
+      double widest = 0.0;
+      for (size_t i = 0; i < shape.numbers.size(); i += 2) {
+        widest = std::max(widest, std::abs(shape.numbers[i]));
+      }
+      return widest;
+    }
+    default:
+      return shape.numbers[0];
+  }
+}
+
+// An angle, a trough, an arch or a star that is as low as a shape and no wider, with a level edge
+// or feet there unless it is a star: a wider one might be wedged between others.
+std::vector<double> ConcaveOutline(const BasicShape<double>& shape, RandomNumbers* random) {
+  const double h = HalfHeight(shape);
+  const double w = HalfWidth(shape) * random->Uniform(0.7, 1.0);
+  const double t = std::min(h, w) * random->Uniform(0.4, 0.9);
+  const double top = h * random->Uniform(0.6, 1.0);
+  const int kind = random->Integer(0, 3);
+  if (kind == 0) return {-w, -h, w, -h, w, t - h, t - w, t - h, t - w, top, -w, top};
+  const double u = w * random->Uniform(0.3, 0.7);
+  if (kind == 1) return {-w, -h, w, -h, w, top, u, top, u, t - h, -u, t - h, -u, top, -w, top};
+  if (kind == 2) return {-w, -h, -u, -h, -u, t - h, u, t - h, u, -h, w, -h, w, top, -w, top};
+  std::vector<double> star;
+  const int points = random->Integer(3, 5);
+  for (int i = 0; i < 2 * points; ++i) {
+    // The first one is the lowest.
+    const double radius = i % 2 == 1 ? h * random->Uniform(0.4, 0.6)
+                                     : h * (i == 0 ? 1.0 : random->Uniform(0.8, 0.95));
+    const double angle = std::numbers::pi * (i / static_cast<double>(points) - 0.5);
+    star.push_back(w / h * radius * std::cos(angle));
+    star.push_back(radius * std::sin(angle));
+  }
+  return star;
+}
+
+}  // namespace
+
+void SceneMaker::ConcavePolygons() {
+  if (seed_ % 4 != 3) {
+    return;
+  }
+  RandomNumbers random(0x636f6e63ULL + 0x9e3779b97f4a7c15ULL * seed_);
+  for (BasicBody<double>& body : scene_.bodies) {
+    const bool is_free = body.name.rfind("body", 0) == 0 || body.name == "wall";
+    if (!is_free || body.shape.type == ShapeType::kNone || !random.Chance(0.6)) {
+      continue;
+    }
+    body.shape = {ShapeType::kPolygon, ConcaveOutline(body.shape, &random)};
+    if (body.motion == Motion::kMoving) body.inertia = body.mass * random.Uniform(0.005, 0.02);
   }
 }
 

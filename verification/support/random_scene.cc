@@ -79,6 +79,7 @@ Scene SceneMaker::Make() {
   Mechanisms();
   Drives();
   Outlines();
+  ConcavePolygons();
   Servos();
   Couplings();
   Ends();

@@ -72,6 +72,8 @@ class SceneMaker {
   /// Ellipses in the place of other shapes, and contact points, in every fourth scene; with random
   /// numbers of their own as well.
   void Outlines();
+  /// Concave polygons in the place of other shapes, in every fourth scene, likewise.
+  void ConcavePolygons();
   /// Servos of joints and forces in every fourth scene, likewise.
   void Servos();
   /// Couplings of joints and joints that end, in every fourth scene, likewise.

@@ -10,13 +10,23 @@ int FindFeaturesAtSeams(const Model<double>& model, int a, const Pose<double>& p
                         ContactFeature features[2]) {
   const ShapeView<double> shape_a = model.Shape(a, parts.a);
   const ShapeView<double> shape_b = model.Shape(b, parts.b);
-  if (const Outline* outline = model.OutlineOf(a); outline != nullptr) {
-    return FindOutlineFeatures(*outline, model.structure->bodies[a].RunOfPart(parts.a), shape_a,
-                               pose_a, shape_b, pose_b, SeamSide::kFirst, max_gap, features);
-  }
-  if (const Outline* outline = model.OutlineOf(b); outline != nullptr) {
-    return FindOutlineFeatures(*outline, model.structure->bodies[b].RunOfPart(parts.b), shape_a,
-                               pose_a, shape_b, pose_b, SeamSide::kSecond, max_gap, features);
+  const Outline* const outline_a = model.OutlineOf(a, parts.a);
+  const Outline* const outline_b = model.OutlineOf(b, parts.b);
+  if (outline_a != nullptr || outline_b != nullptr) {
+    const int run_a = outline_a == nullptr ? 0 : model.structure->bodies[a].RunOfPart(parts.a);
+    const int run_b = outline_b == nullptr ? 0 : model.structure->bodies[b].RunOfPart(parts.b);
+    if (outline_a != nullptr && outline_b != nullptr) {
+      return FindFeaturesOfRuns({*outline_a, run_a, pose_a}, {*outline_b, run_b, pose_b}, max_gap,
+                                features);
+    }
+    const SeamSide side = outline_a != nullptr ? SeamSide::kFirst : SeamSide::kSecond;
+    const Outline& outline = outline_a != nullptr ? *outline_a : *outline_b;
+    const ShapeView<double>& other = outline_a != nullptr ? shape_b : shape_a;
+    if (other.type == ShapeType::kHalfPlane) {
+      return FindHullFeatures(outline, other, pose_a, pose_b, side, max_gap, features);
+    }
+    return FindOutlineFeatures(outline, outline_a != nullptr ? run_a : run_b, shape_a, pose_a,
+                               shape_b, pose_b, side, max_gap, features);
   }
   if (const ShapeSeams* seams = model.SeamsOf(a, parts.a); seams != nullptr) {
     return FindContactFeaturesAtSeams(shape_a, pose_a, shape_b, pose_b, *seams, SeamSide::kFirst,

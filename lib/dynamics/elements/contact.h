@@ -79,7 +79,7 @@ struct ActiveContact {
   }
 };
 
-/// FindFeatures where one of the shapes has seams or is a polyline.
+/// FindFeatures where one of the shapes has seams or an outline.
 int FindFeaturesAtSeams(const Model<double>& model, int a, const Pose<double>& pose_a, int b,
                         const Pose<double>& pose_b, PartPair parts, double max_gap,
                         ContactFeature features[2]);

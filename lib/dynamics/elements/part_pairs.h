@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// The parts of two bodies that may touch: of a polyline the runs that are near the other body,
-// which its tree finds.
+// The parts of two bodies that may touch: of an outline (a polyline or concave polygon) the runs
+// that are near the other body, which its tree finds.
 
 #include <algorithm>
 #include <cmath>
@@ -49,10 +49,25 @@ inline int RunBefore(const Outline& outline, const Vector2<double>& x, double si
   return run.normal.dot(x - run.start) < 0.0 ? nearest : -1;
 }
 
+/// Calls visit(run) for the runs that a box overlaps. A box that no run is near is in the solid
+/// where it is behind the nearest run, which then is its only one.
+template <typename Visit>
+void ForEachRunNear(const Outline& outline, const Aabb& box, const Visit& visit) {
+  bool is_near = false;
+  outline.ForEachRun(box, [&](int run) {
+    is_near = true;
+    visit(run);
+  });
+  if (is_near) return;
+  const Vector2<double> centre(0.5 * (box.min_x + box.max_x), 0.5 * (box.min_y + box.max_y));
+  const double size = 0.5 * std::max(box.max_x - box.min_x, box.max_y - box.min_y);
+  const int run = size > 0.0 ? RunBefore(outline, centre, size) : -1;
+  if (run >= 0) visit(run);
+}
+
 /// Calls visit(PartPair) for the parts of two bodies that may touch, as
 /// ModelStructure::ForEachPartPair. The boxes are grown by how far each body may go; `reach` says
-/// by how much that of a polyline is, m. A body that no run is near is in the solid where it is
-/// behind the nearest one, which then is its only one.
+/// by how much that of an outline is at most, m.
 template <typename Visit>
 void ForEachPartNear(const Model<double>& model, int a, const Pose<double>& pose_a,
                      const Aabb& box_a, int b, const Pose<double>& pose_b, const Aabb& box_b,
@@ -66,26 +81,49 @@ void ForEachPartNear(const Model<double>& model, int a, const Pose<double>& pose
   }
   const BodyIndex& lined = structure.bodies[is_first ? a : b];
   const BodyIndex& other = structure.bodies[is_first ? b : a];
+  if (other.shape == ShapeType::kHalfPlane) {
+    structure.ForEachPartPair(a, b, visit);
+    return;
+  }
   const auto visit_both = [&](int of_lined, int of_other) {
     visit(is_first ? PartPair{of_lined, of_other} : PartPair{of_other, of_lined});
   };
+  const Outline* const second = is_first ? model.OutlineOf(b) : nullptr;
   const Aabb box = BoxInFrame(is_first ? pose_a : pose_b, is_first ? box_b : box_a, reach);
-  bool is_near = false;
-  const auto visit_run = [&](int run) {
-    is_near = true;
-    for (int k = 0; k <= other.num_contact_points; ++k) {
+  const auto visit_others = [&](const auto& visit_part) {
+    if (second == nullptr) return visit_part(0);
+    ForEachRunNear(*second, BoxInFrame(pose_b, box_a, reach),
+                   [&](int run) { visit_part(other.PartOfRun(run)); });
+  };
+  ForEachRunNear(*outline, box, [&](int run) {
+    visit_others([&](int part) { visit_both(lined.PartOfRun(run), part); });
+    for (int k = 1; k <= other.num_contact_points; ++k) {
       visit_both(lined.PartOfRun(run), k);
     }
-  };
-  outline->ForEachRun(box, visit_run);
-  if (!is_near) {
-    const Vector2<double> centre(0.5 * (box.min_x + box.max_x), 0.5 * (box.min_y + box.max_y));
-    const double size = 0.5 * std::max(box.max_x - box.min_x, box.max_y - box.min_y);
-    const int run = size > 0.0 ? RunBefore(*outline, centre, size) : -1;
-    if (run >= 0) visit_run(run);
-  }
+  });
   for (int k = 1; k <= lined.num_contact_points; ++k) {
-    visit_both(k, 0);
+    visit_others([&](int part) { visit_both(k, part); });
+  }
+}
+
+/// Calls visit(PartPair) for all parts of two bodies, however far they are apart.
+template <typename Visit>
+void ForEachPart(const Model<double>& model, int a, int b, const Visit& visit) {
+  const ModelStructure& structure = *model.structure;
+  const auto runs = [&](int body, int other) {
+    const Outline* const outline = model.OutlineOf(body);
+    return outline == nullptr || structure.bodies[other].shape == ShapeType::kHalfPlane
+               ? 1
+               : outline->num_runs();
+  };
+  const BodyIndex& first = structure.bodies[a];
+  const BodyIndex& second = structure.bodies[b];
+  for (int i = 0; i < runs(a, b); ++i) {
+    for (int j = 0; j < runs(b, a); ++j) visit(PartPair{first.PartOfRun(i), second.PartOfRun(j)});
+    for (int k = 1; k <= second.num_contact_points; ++k) visit(PartPair{first.PartOfRun(i), k});
+  }
+  for (int k = 1; k <= first.num_contact_points; ++k) {
+    for (int j = 0; j < runs(b, a); ++j) visit(PartPair{k, second.PartOfRun(j)});
   }
 }
 

@@ -32,8 +32,9 @@ struct PartIndex {
 };
 
 /// Places of a body's parameters; −1 where it has none. Part 0 of a body is its shape; the parts
-/// from 1 on are its contact points, each a polygon with one vertex. The runs of a polyline
-/// (outline.h) are parts too: the first one is part 0, the others follow the contact points.
+/// from 1 on are its contact points, each a polygon with one vertex. The runs of a polyline or
+/// concave polygon (outline.h) are parts too: the first one is part 0, the others follow the
+/// contact points.
 struct BodyIndex {
   std::string name;
   Motion motion = Motion::kStatic;
@@ -56,6 +57,7 @@ struct BodyIndex {
   }
   int PartOfRun(int run) const { return run == 0 ? 0 : num_contact_points + run; }
   int RunOfPart(int part) const { return part == 0 ? 0 : part - num_contact_points; }
+  bool IsContactPoint(int part) const { return part > 0 && part <= num_contact_points; }
   bool HasContacts() const { return shape != ShapeType::kNone || num_contact_points > 0; }
 };
 
@@ -210,8 +212,8 @@ struct ModelStructure {
 inline constexpr int kGravityX = 0;
 inline constexpr int kGravityY = 1;
 
-/// The seams of bodies that do not move, or that move alike, and the outlines of polylines
-/// (model_seams.h).
+/// The seams of bodies that do not move, or that move alike, and the outlines of polylines and
+/// concave polygons (model_seams.h).
 struct ModelSeams {
   std::vector<ShapeSeams> shapes;
   std::vector<Outline> outlines;
@@ -223,8 +225,8 @@ struct Model {
   std::shared_ptr<const ModelStructure> structure;
   std::vector<T> parameters;
   std::shared_ptr<const ModelSeams> seams{};  ///< of a model in double; null: there are none
-  /// Of each body the place in seams->shapes, of a polyline in seams->outlines; −1: it has none.
-  std::vector<int> seams_of{};
+  /// Of each body the place in seams->shapes and in seams->outlines; −1: it has none.
+  std::vector<int> seams_of{}, outline_of{};
 
   ShapeView<T> Shape(int body, int part = 0) const {
     const PartIndex index = structure->bodies[body].Part(part);
@@ -233,14 +235,16 @@ struct Model {
   }
   /// The seams of a shape, or nullptr. Contact points have none.
   const ShapeSeams* SeamsOf(int body, int part) const {
-    return seams == nullptr || part != 0 || seams_of[body] < 0 || IsPolyline(body)
-               ? nullptr
-               : &seams->shapes[seams_of[body]];
+    return seams == nullptr || part != 0 || seams_of[body] < 0 ? nullptr
+                                                               : &seams->shapes[seams_of[body]];
   }
-  bool IsPolyline(int body) const { return structure->bodies[body].shape == ShapeType::kPolyline; }
-  /// The outline of a body that is a polyline, or nullptr.
+  /// The outline of a body that is a polyline or a concave polygon, or nullptr.
   const Outline* OutlineOf(int body) const {
-    return seams == nullptr || !IsPolyline(body) ? nullptr : &seams->outlines[seams_of[body]];
+    return seams == nullptr || outline_of[body] < 0 ? nullptr : &seams->outlines[outline_of[body]];
+  }
+  /// The same for a part that is not a contact point.
+  const Outline* OutlineOf(int body, int part) const {
+    return structure->bodies[body].IsContactPoint(part) ? nullptr : OutlineOf(body);
   }
 };
 

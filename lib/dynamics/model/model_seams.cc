@@ -13,6 +13,11 @@
 namespace tangible {
 namespace {
 
+bool HasOutline(const Model<double>& model, int body) {
+  return model.structure->bodies[body].shape == ShapeType::kPolyline ||
+         IsConcavePolygon(model.Shape(body));
+}
+
 bool MoveAlike(const State<double>& state, int a, int b) {
   return std::equal(&state.twist[3 * a], &state.twist[3 * a] + 3, &state.twist[3 * b]) &&
          (state.twist[3 * a + 2] == 0.0);
@@ -60,21 +65,24 @@ std::vector<std::pair<int, int>> FindNeighbours(const Model<double>& model,
 void FindModelSeams(const State<double>& state, Model<double>* model) {
   model->seams = nullptr;
   model->seams_of.clear();
+  model->outline_of.clear();
   const ModelStructure& structure = *model->structure;
   std::vector<bool> may_have_seams(structure.bodies.size(), false);
   int count = 0;
   for (int body = 0; body < structure.num_bodies(); ++body) {
     const BodyIndex& index = structure.bodies[body];
-    if (index.block < 0 && index.shape != ShapeType::kNone && MayHaveSeams(model->Shape(body))) {
+    if (index.shape == ShapeType::kNone || HasOutline(*model, body)) continue;
+    if (index.block < 0 && MayHaveSeams(model->Shape(body))) {
       may_have_seams[body] = true;
       ++count;
     }
   }
   ModelSeams seams;
   std::vector<int> seams_of(structure.bodies.size(), -1);
+  std::vector<int> outline_of(structure.bodies.size(), -1);
   for (int body = 0; body < structure.num_bodies(); ++body) {
-    if (!model->IsPolyline(body)) continue;
-    seams_of[body] = static_cast<int>(seams.outlines.size());
+    if (!HasOutline(*model, body)) continue;
+    outline_of[body] = static_cast<int>(seams.outlines.size());
     seams.outlines.emplace_back(model->Shape(body));
   }
   if (count < 2 && seams.outlines.empty()) {
@@ -99,6 +107,7 @@ void FindModelSeams(const State<double>& state, Model<double>* model) {
   if (!seams.shapes.empty() || !seams.outlines.empty()) {
     model->seams = std::make_shared<const ModelSeams>(std::move(seams));
     model->seams_of = std::move(seams_of);
+    model->outline_of = std::move(outline_of);
   }
 }
 

@@ -76,7 +76,8 @@ class EventSearch::PairSearch {
         located_(search->GapTolerance(segment_.before, a, b)),
         closed_(std::any_of(segment_.contacts.begin(), segment_.contacts.end(),
                             [&](const ActiveContact& c) { return IsOfPair(c); })),
-        outline_(model.OutlineOf(a) != nullptr ? model.OutlineOf(a) : model.OutlineOf(b)),
+        outline_a_(model.OutlineOf(a, parts.a)),
+        outline_b_(model.OutlineOf(b, parts.b)),
         may_hide_(model.seams != nullptr && !RestsAtSeams()) {}
 
   /// The pair's contact that is handed over where the event is, if there is one.
@@ -120,7 +121,7 @@ class EventSearch::PairSearch {
   // The distance of a pair whose nearest features seams hide, which bounds the gaps that it has
   // before and after; sets nearest_.
   double HiddenGap(const State<double>& state);
-  // The same for a run of a polyline that the other body is not over; infinite where they touch,
+  // The same for a run of an outline that the other body is not over; infinite where they touch,
   // from behind.
   double HiddenRunGap(const State<double>& state, ActiveContact contact);
   // Makes a contact the nearest.
@@ -166,8 +167,10 @@ class EventSearch::PairSearch {
   ActiveContact nearest_;
   Vector2<double> normal_{0.0, 0.0};
   bool on_face_ = false;  ///< the normal is a face's, not that of the line between two points
-  const Outline* const outline_;  ///< of the body that is a polyline; null: neither is
-  const bool may_hide_;           ///< a gap that ends at a seam or a run's end counts
+  /// Of polylines and concave polygons; null: the part is another one.
+  const Outline* const outline_a_;
+  const Outline* const outline_b_;
+  const bool may_hide_;  ///< a gap that ends at a seam or a run's end counts
 };
 
 void EventSearch::SearchPair(const Model<double>& model, int a, int b, PartPair parts,
@@ -212,7 +215,7 @@ bool EventSearch::PairSearch::Continues(const State<double>& state, const Active
 }
 
 bool EventSearch::PairSearch::RestsAtSeams() const {
-  if (outline_ != nullptr) {
+  if (outline_a_ != nullptr || outline_b_ != nullptr) {
     return std::any_of(segment_.contacts.begin(), segment_.contacts.end(),
                        [&](const auto& c) { return c.IsOfShapes() && c.a == a_ && c.b == b_; });
   }
@@ -240,7 +243,7 @@ double EventSearch::PairSearch::HiddenGap(const State<double>& state) {
   ActiveContact contact;
   contact.a = a_;
   contact.b = b_;
-  if (outline_ != nullptr) {
+  if (outline_a_ != nullptr || outline_b_ != nullptr) {
     return HiddenRunGap(state, contact);
   }
   ContactFeature features[2];
@@ -259,15 +262,22 @@ double EventSearch::PairSearch::HiddenGap(const State<double>& state) {
 }
 
 double EventSearch::PairSearch::HiddenRunGap(const State<double>& state, ActiveContact contact) {
-  const bool is_first = model_.OutlineOf(a_) != nullptr;
-  const int run = is_first ? model_.structure->bodies[a_].RunOfPart(parts_.a)
-                           : model_.structure->bodies[b_].RunOfPart(parts_.b);
   ContactFeature& feature = contact.feature;
-  const double gap =
-      DistanceOfRun(*outline_, run, state.PoseOf(is_first ? a_ : b_),
-                    is_first ? model_.Shape(b_, parts_.b) : model_.Shape(a_, parts_.a),
-                    state.PoseOf(is_first ? b_ : a_), is_first ? &feature.a : &feature.b,
-                    is_first ? &feature.b : &feature.a);
+  const Pose<double> pose_a = state.PoseOf(a_);
+  const Pose<double> pose_b = state.PoseOf(b_);
+  const int run_a = model_.structure->bodies[a_].RunOfPart(parts_.a);
+  const int run_b = model_.structure->bodies[b_].RunOfPart(parts_.b);
+  double gap = kInfinity;
+  if (outline_a_ != nullptr && outline_b_ != nullptr) {
+    gap = DistanceOfRuns({*outline_a_, run_a, pose_a}, {*outline_b_, run_b, pose_b}, &feature.a,
+                         &feature.b);
+  } else if (outline_a_ != nullptr) {
+    gap = DistanceOfRun(*outline_a_, run_a, pose_a, model_.Shape(b_, parts_.b), pose_b, &feature.a,
+                        &feature.b);
+  } else {
+    gap = DistanceOfRun(*outline_b_, run_b, pose_b, model_.Shape(a_, parts_.a), pose_a, &feature.b,
+                        &feature.a);
+  }
   if (!(gap > touch_)) return kInfinity;
   feature.part_a = parts_.a;
   feature.part_b = parts_.b;

@@ -142,9 +142,11 @@ TEST(ParameterizedSceneTest, LimitsAndOutlinesAreCheckedAsWhenASceneIsRead) {
   ASSERT_TRUE(fitted.Create(scene, {}, {low}, &error)) << error.what;
   EXPECT_TRUE(fitted.Set(Eigen::VectorXd::Constant(1, 0.9)));
   EXPECT_FALSE(fitted.Set(Eigen::VectorXd::Constant(1, 1.6)));
-  scene.bodies[0].shape = {ShapeType::kPolygon, {-1.0, -1.0, 1.0, -1.0, 0.0, 2.0}};
+  // A concave polygon whose notch must not reach through its back.
+  scene.bodies[0].shape = {ShapeType::kPolygon,
+                           {-1.0, -1.0, 1.0, -1.0, 1.0, 3.0, 0.0, 2.0, -1.0, 3.0}};
   scene.bodies[0].inertia = 1.0;
-  ASSERT_TRUE(fitted.Create(scene, {}, {Parameter("bodies/bob/shape/vertices/2/y", 2.0)}, &error))
+  ASSERT_TRUE(fitted.Create(scene, {}, {Parameter("bodies/bob/shape/vertices/3/y", 2.0)}, &error))
       << error.what;
   EXPECT_TRUE(fitted.Set(Eigen::VectorXd::Constant(1, -0.9)));
   EXPECT_FALSE(fitted.Set(Eigen::VectorXd::Constant(1, -1.1)));

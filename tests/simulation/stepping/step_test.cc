@@ -218,6 +218,30 @@ TEST(StepTest, NoAllocationOnAPolyline) {
   EXPECT_GT(state.pose[0], 0.1);
 }
 
+// A staple falls onto a post and rests there: edges of both outlines.
+TEST(StepTest, NoAllocationOnConcavePolygons) {
+  Model<double> model;
+  State<double> state;
+  BuildModel(SceneOf(R"({"bodies": [
+      {"name": "staple", "shape": {"polygon": {"vertices": [[-0.25, -0.35], [-0.15, -0.35],
+       [-0.15, 0.15], [0.15, 0.15], [0.15, -0.35], [0.25, -0.35], [0.25, 0.25], [-0.25, 0.25]]}},
+       "mass": 1, "friction": 0.5, "position": [0.02, 0], "angle": 0.1},
+      {"name": "post", "static": true, "friction": 0.5, "shape": {"polygon": {
+       "vertices": [[-1, -1], [1, -1], [1, -0.8], [0.1, -0.8], [0.1, 0], [-0.1, 0], [-0.1, -0.8],
+                    [-1, -0.8]]}}}]})"),
+             &model, &state);
+  Stepper stepper(model);
+  for (int k = 0; k < 30; ++k) {
+    ASSERT_EQ(stepper.Step(model, 0.01 * k, 0.01, &state).status, StepStatus::kDone);
+  }
+  const long before = testing::NumAllocations();
+  for (int k = 30; k < 150; ++k) {
+    ASSERT_EQ(stepper.Step(model, 0.01 * k, 0.01, &state).status, StepStatus::kDone);
+  }
+  EXPECT_EQ(testing::NumAllocations(), before);
+  EXPECT_NEAR(state.pose[1], -0.15, 1e-6);
+}
+
 // Six stacks of two discs: islands, each of which had its memory from its first step on.
 TEST(StepTest, NoAllocationWithIslandsThatRest) {
   std::string bodies;

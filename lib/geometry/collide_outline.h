@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// What the features of outlines against other shapes and against outlines share. Internal to the
+// module.
+
+#include <algorithm>
+
+#include "tangible/geometry/outline.h"
+#include "tangible/geometry/tolerances.h"
+
+namespace tangible::internal {
+
+/// The normals of a corner, counter-clockwise from the normal of the edge that ends there to that
+/// of the edge that starts there.
+struct NormalCone {
+  Vector2<double> first, last;
+  bool Contains(const Vector2<double>& direction) const {
+    return Cross(first, direction) >= -kFlushTurn && Cross(direction, last) >= -kFlushTurn &&
+           direction.dot(first + last) > 0.0;
+  }
+  /// Whether a face whose outward normal is −`direction` may come to lie on one of the corner's
+  /// edges: its contact with the corner is the second one of two faces that are nearly parallel.
+  bool Faces(const Vector2<double>& direction) const {
+    return Contains(direction) || direction.dot(first) > kFacing || direction.dot(last) > kFacing;
+  }
+};
+
+/// `pose` in a frame.
+inline Pose<double> RelativeTo(const Pose<double>& frame, const Pose<double>& pose) {
+  Pose<double> relative;
+  relative.position = frame.Inverse(pose.position);
+  relative.angle = pose.angle - frame.angle;
+  relative.rotation.cosine =
+      frame.rotation.cosine * pose.rotation.cosine + frame.rotation.sine * pose.rotation.sine;
+  relative.rotation.sine =
+      frame.rotation.cosine * pose.rotation.sine - frame.rotation.sine * pose.rotation.cosine;
+  return relative;
+}
+
+inline double DistanceOfSegment(const Vector2<double>& start, const Vector2<double>& end,
+                                const Vector2<double>& x) {
+  const Vector2<double> along = end - start;
+  const double square = along.squaredNorm();
+  const double share = square > 0.0 ? std::clamp(along.dot(x - start) / square, 0.0, 1.0) : 0.0;
+  return (x - start - share * along).norm();
+}
+
+}  // namespace tangible::internal
