@@ -32,6 +32,7 @@
 #include "tangible/estimation/results/fit_schema.h"
 #include "tangible/estimation/results/fitted_scene.h"
 #include "tangible/estimation/results/iteration_printer.h"
+#include "tangible/estimation/results/noise_output.h"
 #include "tangible/estimation/results/posterior_output.h"
 #include "tangible/estimation/results/prediction.h"
 #include "tangible/estimation/results/report.h"
@@ -432,6 +433,16 @@ int Prepare(const std::string& text, const std::string& file, Prepared* prepared
   if (prepared->problem == nullptr) {
     return ReportError(error);
   }
+  error =
+      RefusedWithNoise(*prepared->problem, {{"--posterior", !FLAGS_posterior.empty()},
+                                            {"--design", !FLAGS_design.empty()},
+                                            {"--profile", !FLAGS_profile.empty()},
+                                            {"--checkpoint", !FLAGS_checkpoint.empty()},
+                                            {"--discretisation_check", FLAGS_discretisation_check},
+                                            {"--compare_motion", FLAGS_compare_motion},
+                                            {"--shard", !FLAGS_shard.empty()},
+                                            {"--merge", !FLAGS_merge.empty()}});
+  if (!error.empty()) return ReportError("tangible-fit: " + error, kExitUsage);
   error = ReadProfiles(FLAGS_profile, *prepared->problem,
                        &prepared->fit.input.recordings.front().problem.options);
   if (!error.empty()) return ReportError("tangible-fit: --profile: " + error, kExitUsage);
@@ -452,18 +463,6 @@ int Prepare(const std::string& text, const std::string& file, Prepared* prepared
   return error.empty() ? kExitDone : ReportError(error);
 }
 
-OrderedJson Describe(const std::vector<ParameterEntry>& entries, const MotionCheck& check) {
-  if (!check.message.empty()) return {{"message", check.message}};
-  OrderedJson differences = OrderedJson::array();
-  for (size_t k = 0; k < entries.size(); ++k) {
-    differences.push_back({{"parameter", entries[k].name},
-                           {"difference", check.difference[static_cast<Eigen::Index>(k)]}});
-  }
-  return {{"differences", differences},
-          {"difference_max", check.difference.size() == 0 ? 0.0 : check.difference.maxCoeff()},
-          {"verdict", check.verdict}};
-}
-
 /// Returns what went wrong or empty.
 std::string WriteFiles(const Prepared& prepared, const FitResult& result,
                        const FitFindings& findings, const MotionCheck* motion) {
@@ -474,7 +473,7 @@ std::string WriteFiles(const Prepared& prepared, const FitResult& result,
     OrderedJson json = ResultToJson(problem, result, findings);
     json["certificate"] =
         result.certificate.verdict.empty() ? OrderedJson(nullptr) : ToJson(result.certificate);
-    if (motion != nullptr) json["motion"] = Describe(problem.entries(), *motion);
+    if (motion != nullptr) json["motion"] = MotionToJson(problem.entries(), *motion);
     return JsonText(json);
   });
   if (!estimated) {
@@ -576,6 +575,7 @@ void PrintResult(const Prepared& prepared, const FitResult& result,
                  const VarianceComponents& components) {
   PrintEstimates(prepared.problem->entries(), result);
   PrintComponents(components);
+  std::cout << DescribeProcessNoise(components);
   PrintOutliers(SummarizeResiduals(*prepared.problem, result.residuals));
   const Certificate& certificate = result.certificate;
   if (certificate.verdict.empty()) return;

@@ -769,29 +769,4 @@ FitResult Fit(const FitOptions& options, RolloutResiduals* residuals, const FitP
   return result;
 }
 
-FitInput InputOf(FitProblem problem) {
-  FitInput input;
-  input.scopes.resize(problem.parameters.size());
-  input.recordings.push_back({"", 1.0, std::move(problem)});
-  return input;
-}
-
-std::unique_ptr<RecordingsProblem> MakeProblem(const FitInput& input, ParameterError* error,
-                                               int* fault) {
-  std::vector<RecordedRun> runs;
-  for (const RecordingInput& recording : input.recordings) {
-    const FitProblem& problem = recording.problem;
-    ParameterizedScene scene;
-    if (!scene.Create(problem.scene, problem.points, problem.parameters, error,
-                      problem.instruments)) {
-      *fault = static_cast<int>(runs.size());
-      return nullptr;
-    }
-    runs.push_back({recording.name, recording.weight,
-                    RolloutResiduals(std::move(scene), problem.observations, problem.channels)});
-    runs.back().residuals.SetFiles(problem.files);
-  }
-  return std::make_unique<RecordingsProblem>(std::move(runs), input.scopes);
-}
-
 }  // namespace tangible

@@ -82,6 +82,7 @@ struct FitProblem {
   std::vector<Channel> channels;   ///< of the observations; empty: they are made directly
   std::vector<std::string> files;  ///< of the channels, as written
   FitOptions options;
+  std::vector<NoiseTerm> process_noise;  ///< random forces, the same in all recordings
 };
 
 /// A run that is fitted with others.
@@ -101,6 +102,9 @@ struct FitInput {
 
 /// The fit of one run.
 FitInput InputOf(FitProblem problem);
+
+/// The residuals of one run, with its random forces; none with `error` where a parameter is wrong.
+std::optional<RolloutResiduals> MakeRun(const FitProblem& problem, ParameterError* error);
 
 /// The residuals of an input; null with `error` where a parameter of recording `fault` is wrong.
 std::unique_ptr<RecordingsProblem> MakeProblem(const FitInput& input, ParameterError* error,

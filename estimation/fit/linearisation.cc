@@ -229,6 +229,7 @@ bool Linearizer::Compute(const Eigen::VectorXd& q, const HuberBounds& huber,
                          BlockDerivatives derivatives, Eigen::VectorXd* numbers) {
   const Eigen::VectorXd p = ToParameters(entries(), q);
   const Eigen::VectorXd q_scale = ParametersByInternal(entries(), p);
+  problem_->SetHuber(huber.current);
   std::vector<Eigen::VectorXd> blocks(static_cast<size_t>(layout_.num_blocks()));
   if (!EvaluateBlocks(p, derivatives, [&](int block, BlockEvaluation* evaluation) {
         blocks[block] =

@@ -52,6 +52,8 @@ class ProblemWithHeld : public LeastSquaresProblem {
   int num_observation_rows(int block) const override {
     return problem_->num_observation_rows(block);
   }
+  int num_noise_rows(int block) const override { return problem_->num_noise_rows(block); }
+  void SetHuber(double huber) override { problem_->SetHuber(huber); }
   double weight(int block) const override { return problem_->weight(block); }
   std::vector<RowPlace> Places(int block) const override { return problem_->Places(block); }
   bool EvaluateBlock(int block, const Eigen::VectorXd& p, GradientMethod method,

@@ -77,6 +77,9 @@ inline constexpr double kEqualCost = 1e-9;
 /// Of the deviation of a sensor's factor, or the spread itself: a fit with estimated noise or
 /// spreads has converged where it changes them by less.
 inline constexpr double kSettledChange = 1e-3;
+/// Of the derivative of ln L by ln s: an intensity s that the likelihood pulls by less has no
+/// effect on it where it has no curvature either.
+inline constexpr double kUnseenScore = 1e-2;
 /// Of one observation: the sigma of a sensor whose observations have a smaller redundancy ρ cannot
 /// be estimated, because they leave no residuals.
 inline constexpr double kLeastRedundancy = 0.5;

@@ -42,10 +42,33 @@ bool Update(const FitOptions& options, RecordingsProblem* problem, FitResult* re
             VarianceComponents* components, double* largest) {
   const bool spreads = std::any_of(components->spreads.begin(), components->spreads.end(),
                                    [](const SpreadEstimate& one) { return one.estimated; });
+  const bool forces = std::any_of(components->forces.begin(), components->forces.end(),
+                                  [](const NoiseIntensity& one) { return one.estimated; });
+  if (forces && !UpdateIntensities(options, *result, problem, &components->forces, largest,
+                                   &result->message)) {
+    return false;
+  }
   return (components->noise.empty() ||
           UpdateNoise(options, *result, problem, &components->noise, largest, &result->message)) &&
          (!spreads || UpdateSpreads(options, *result, problem, &components->spreads, largest,
                                     &result->message));
+}
+
+/// What is said of the random forces, and their course, of a result that is the last one.
+void ConcludeForces(const FitOptions& options, RecordingsProblem* problem, FitResult* result,
+                    VarianceComponents* components) {
+  for (NoiseIntensity& one : components->forces) {
+    if (!one.estimated) continue;
+    if (result->status != FitStatus::kConverged) one.interval.reset();
+    if (one.seen) continue;
+    result->uncertainty.warnings.push_back(
+        "the observations show no random force of " + NameOf(one.term) +
+        ", whose intensity has no interval: the model explains them without it");
+  }
+  if (components->forces.empty() || result->estimate.size() == 0) return;
+  std::string message;
+  components->smoothed = SmoothedRuns(options, result->estimate, problem, &message);
+  if (!message.empty()) result->uncertainty.warnings.push_back("no smoothed states: " + message);
 }
 
 /// Intervals of spreads, and the certificate, of a result that is the last one.
@@ -71,10 +94,22 @@ void Conclude(const FitOptions& options, RecordingsProblem* problem, FitResult* 
 
 }  // namespace
 
-FitResult FitWithComponents(const FitOptions& options, RecordingsProblem* problem,
+FitOptions OptionsFor(FitOptions options, const RecordingsProblem& problem) {
+  if (!problem.HasNoise()) return options;
+  options.approach = FitApproach::kPlain;
+  options.starts = std::max(1, options.starts);
+  options.certificate = CertificatePass::kSkip;
+  options.held_test = HeldTest::kSkip;
+  options.profile_pass = ProfilePass::kSkip;
+  return options;
+}
+
+FitResult FitWithComponents(const FitOptions& asked, RecordingsProblem* problem,
                             const FitProgress& progress, VarianceComponents* components,
                             const NextLog& next_log) {
-  *components = {SensorsToEstimate(*problem), SpreadsOf(*problem)};
+  const FitOptions options = OptionsFor(asked, *problem);
+  if (problem->HasNoise()) BeginIntensities(problem);
+  *components = {SensorsToEstimate(*problem), SpreadsOf(*problem), IntensitiesOf(*problem), {}};
   const auto fit = [&](const FitOptions& how, const FitProgress& told, bool* same) {
     FitLog* const log = next_log ? next_log() : nullptr;
     FitResult result = Fit(how, problem, told, log);
@@ -83,10 +118,18 @@ FitResult FitWithComponents(const FitOptions& options, RecordingsProblem* proble
   };
   bool same = true;
   const bool estimates = !components->noise.empty() ||
+                         std::any_of(components->forces.begin(), components->forces.end(),
+                                     [](const NoiseIntensity& one) { return one.estimated; }) ||
                          std::any_of(components->spreads.begin(), components->spreads.end(),
                                      [](const SpreadEstimate& one) { return one.estimated; });
   if (!estimates) {
-    return fit(options, progress, &same);
+    FitResult result = fit(options, progress, &same);
+    if (same) ConcludeForces(options, problem, &result, components);
+    return result;
+  }
+  if (std::any_of(components->forces.begin(), components->forces.end(),
+                  [](const NoiseIntensity& one) { return one.estimated; })) {
+    SettleIntensities(options, problem, &components->forces);
   }
   // The tests that judge the estimate are made once, with the final components.
   FitOptions search = options;
@@ -125,11 +168,14 @@ FitResult FitWithComponents(const FitOptions& options, RecordingsProblem* proble
     }
     if (fits == kMostFits) {
       result.status = FitStatus::kNotConverged;
-      result.message = "the sigma of sensors, or the spread of parameters, did not settle in " +
-                       std::to_string(fits) + " fits";
+      result.message =
+          "the sigma of sensors, the spread of parameters or the intensity of random forces did "
+          "not settle in " +
+          std::to_string(fits) + " fits";
     }
   }
   Conclude(options, problem, &result, &components->spreads);
+  ConcludeForces(options, problem, &result, components);
   return result;
 }
 

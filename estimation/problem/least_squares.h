@@ -60,6 +60,10 @@ class LeastSquaresProblem {
   virtual int num_rows(int block) const = 0;
   /// Number of rows of observations, which come first.
   virtual int num_observation_rows(int block) const { return num_rows(block); }
+  /// Number of rows of random forces, which follow them (process_noise.h).
+  virtual int num_noise_rows(int /*block*/) const { return 0; }
+  /// Huber's bound of the cost whose rows are asked for next, which matters to random forces alone.
+  virtual void SetHuber(double /*huber*/) {}
   /// w_b > 0. A block without observation rows is a prior, and has the weight 1.
   virtual double weight(int /*block*/) const { return 1.0; }
   /// The place of each observation row.

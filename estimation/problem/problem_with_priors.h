@@ -49,6 +49,8 @@ class ProblemWithPriors : public LeastSquaresProblem {
   int num_own(int block) const override;
   int num_rows(int block) const override;
   int num_observation_rows(int block) const override;
+  int num_noise_rows(int block) const override;
+  void SetHuber(double huber) override { problem_->SetHuber(huber); }
   double weight(int block) const override;
   std::vector<RowPlace> Places(int block) const override;
   bool EvaluateBlock(int block, const Eigen::VectorXd& p, GradientMethod method,

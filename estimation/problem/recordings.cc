@@ -111,6 +111,10 @@ void RecordingsProblem::SetInitial(const Eigen::VectorXd& p) {
   }
 }
 
+void RecordingsProblem::SetHuber(double huber) {
+  for (RecordedRun& recording : recordings_) recording.residuals.SetHuber(huber);
+}
+
 std::vector<RowPlace> RecordingsProblem::Places(int block) const {
   return recordings_[block].residuals.Places(0);
 }
@@ -188,6 +192,7 @@ std::vector<std::string> RecordingsProblem::FindInconsistencies(const Eigen::Vec
 }
 
 std::unique_ptr<LeastSquaresProblem> RecordingsProblem::Window(double part) const {
+  if (HasNoise()) return nullptr;
   std::vector<RecordedRun> early;
   for (const RecordedRun& recording : recordings_) {
     early.push_back({recording.name, recording.weight, recording.residuals.FirstPart(part)});
@@ -196,6 +201,7 @@ std::unique_ptr<LeastSquaresProblem> RecordingsProblem::Window(double part) cons
 }
 
 std::unique_ptr<LeastSquaresProblem> RecordingsProblem::Released(const std::string& path) const {
+  if (HasNoise()) return nullptr;
   std::vector<RecordedRun> runs;
   for (const RecordedRun& recording : recordings_) {
     std::optional<RolloutResiduals> with = recording.residuals.With(path);

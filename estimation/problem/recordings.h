@@ -76,7 +76,16 @@ class RecordingsProblem : public LeastSquaresProblem {
   int num_shared() const override { return static_cast<int>(shared_.size()); }
   int num_blocks() const override { return static_cast<int>(recordings_.size()); }
   int num_own(int /*block*/) const override { return static_cast<int>(own_.size()); }
-  int num_rows(int block) const override { return recordings_[block].residuals.num_residuals(); }
+  int num_rows(int block) const override { return recordings_[block].residuals.num_rows(0); }
+  int num_observation_rows(int block) const override {
+    return recordings_[block].residuals.num_residuals();
+  }
+  int num_noise_rows(int block) const override {
+    return recordings_[block].residuals.num_noise_rows(0);
+  }
+  void SetHuber(double huber) override;
+  /// Whether there are random forces.
+  bool HasNoise() const { return recordings_.front().residuals.noise() != nullptr; }
   double weight(int block) const override { return recordings_[block].weight; }
   std::vector<RowPlace> Places(int block) const override;
   bool EvaluateBlock(int block, const Eigen::VectorXd& p, GradientMethod method,

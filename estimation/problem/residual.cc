@@ -159,23 +159,35 @@ RolloutResiduals RolloutResiduals::FirstPart(double part) const {
 }
 
 std::unique_ptr<LeastSquaresProblem> RolloutResiduals::Window(double part) const {
+  if (noise_) return nullptr;
   return std::make_unique<RolloutResiduals>(FirstPart(part));
 }
 
 bool RolloutResiduals::EvaluateBlock(int /*block*/, const Eigen::VectorXd& p, GradientMethod method,
                                      BlockDerivatives derivatives, BlockEvaluation* evaluation) {
   const long before = rollouts_;
-  const bool done =
-      Evaluate(p, method, &evaluation->residuals,
-               derivatives == BlockDerivatives::kCompute ? &evaluation->jacobian : nullptr);
+  RowMatrixXd* const jacobian =
+      derivatives == BlockDerivatives::kCompute ? &evaluation->jacobian : nullptr;
+  const bool done = noise_ ? WithNoise(p, &evaluation->residuals, jacobian)
+                           : Evaluate(p, method, &evaluation->residuals, jacobian);
   evaluation->message = message_;
   evaluation->rollouts = rollouts_ - before;
   return done;
 }
 
-// The certificate is for the parameters that set numbers of the scene.
+bool RolloutResiduals::WithNoise(const Eigen::VectorXd& p, Eigen::VectorXd* residuals,
+                                 RowMatrixXd* jacobian) {
+  if (!SetParameters(p)) return false;
+  const long before = noise_->rollouts();
+  const bool done = noise_->Evaluate(p, this, residuals, jacobian, &message_);
+  rollouts_ += noise_->rollouts() - before;
+  return done;
+}
+
+// The certificate is for the parameters that set numbers of the scene. That of a run without the
+// random forces would be one of another motion.
 std::optional<Certificate> RolloutResiduals::Certify(const Eigen::VectorXd& p) {
-  if (!SetParameters(p)) {
+  if (noise_ || !SetParameters(p)) {
     return std::nullopt;
   }
   std::vector<std::string> names;
@@ -192,7 +204,7 @@ std::optional<Certificate> RolloutResiduals::Certify(const Eigen::VectorXd& p) {
 
 void RolloutResiduals::AddRadii(const Eigen::VectorXd& p, Certificate* certificate) {
   const std::vector<ParameterEntry>& entries = scene_.entries();
-  if (entries.size() > kMostRadiusRuns || !SetParameters(p)) return;
+  if (noise_ || entries.size() > kMostRadiusRuns || !SetParameters(p)) return;
   ChoiceList own;
   if (!ChoicesOf(scene_.model(), nullptr, scene_.initial_state(), &own)) return;
   Certificate found;
@@ -254,6 +266,12 @@ void RolloutResiduals::NameSamplesOnImpacts(Certificate* certificate) const {
 
 bool RolloutResiduals::Evaluate(const Eigen::VectorXd& p, GradientMethod method,
                                 Eigen::VectorXd* residuals, RowMatrixXd* jacobian) {
+  if (noise_) {
+    const bool done = WithNoise(p, residuals, jacobian);
+    if (done) residuals->conservativeResize(num_residuals());
+    if (done && jacobian != nullptr) jacobian->conservativeResize(num_residuals(), Eigen::NoChange);
+    return done;
+  }
   if (!SetParameters(p)) {
     return false;
   }
@@ -312,14 +330,19 @@ bool RolloutResiduals::Accept(const RolloutReport& report) {
 bool RolloutResiduals::Plain() {
   State<double> final;
   event_times_.Start();
+  Stepper own(scene_.model());
+  Controls controls;
+  if (followed_) controls = followed_->In(scene_.model());
   const bool done = Accept(Rollout(
-      scene_.model(), scene_.initial_state(),
+      followed_ ? ControlledModel<double>(scene_.model(), controls)
+                : ControlledModel<double>(scene_.model()),
+      scene_.initial_state(),
       [this](long k, double, const State<double>& state, Stepper* stepper) {
         plan_.Add(k, state, &samples_, &rates_);
         event_times_.Add(k, stepper);
         AddForces(k, stepper);
       },
-      &final));
+      &own, &final));
   if (done) FinishEvents(final);
   return done;
 }
@@ -663,7 +686,7 @@ RowMatrixXd RolloutResiduals::FromSampleDerivatives(const std::vector<double>& s
 HeldColumns RolloutResiduals::EvaluateHeld(int /*block*/, const Eigen::VectorXd& p,
                                            GradientMethod method, int most) {
   HeldColumns held;
-  if (!SetParameters(p)) {
+  if (noise_ || !SetParameters(p)) {
     return held;
   }
   const std::vector<FitParameter> candidates = Candidates(scene_);
@@ -696,6 +719,7 @@ std::optional<RolloutResiduals> RolloutResiduals::With(const std::string& path) 
 }
 
 std::unique_ptr<LeastSquaresProblem> RolloutResiduals::Released(const std::string& path) const {
+  if (noise_) return nullptr;
   std::optional<RolloutResiduals> with = With(path);
   return with ? std::make_unique<RolloutResiduals>(std::move(*with)) : nullptr;
 }

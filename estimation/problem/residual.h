@@ -27,6 +27,7 @@
 #include "tangible/estimation/problem/least_squares.h"
 #include "tangible/estimation/problem/measurement.h"
 #include "tangible/estimation/problem/parameterized_scene.h"
+#include "tangible/estimation/problem/process_noise.h"
 #include "tangible/estimation/problem/sampling.h"
 #include "tangible/simulation/derivatives/rollout_adjoint.h"
 #include "tangible/simulation/stepping/rollout.h"
@@ -61,12 +62,26 @@ class RolloutResiduals : public LeastSquaresProblem {
   /// Names of the observations' files, by Channel::file; empty where there are none.
   const std::vector<std::string>& files() const { return files_; }
   void SetFiles(std::vector<std::string> files) { files_ = std::move(files); }
+  /// Adds random forces, for which the scene was made (WithNoiseForces); all derivatives are then
+  /// those of the tangent. Nothing of the observations may need the whole run, no parameter may
+  /// move their times, and the run must have steps.
+  void SetNoise(const std::vector<NoiseTerm>& terms) { noise_.emplace(terms, *this); }
+  /// Lets the forces that another run of the same scene has found act in this one, whose
+  /// residuals are then made without derivatives alone.
+  void Follow(const RolloutResiduals& other) { followed_ = other.noise()->Found(other); }
+  const ProcessNoise* noise() const { return noise_ ? &*noise_ : nullptr; }
+  ProcessNoise* noise() { return noise_ ? &*noise_ : nullptr; }
 
   const std::vector<ParameterEntry>& entries() const override { return scene_.entries(); }
   int num_shared() const override { return num_parameters(); }
   int num_blocks() const override { return 1; }
   int num_own(int /*block*/) const override { return 0; }
-  int num_rows(int /*block*/) const override { return num_residuals(); }
+  int num_rows(int block) const override { return num_residuals() + num_noise_rows(block); }
+  int num_observation_rows(int /*block*/) const override { return num_residuals(); }
+  int num_noise_rows(int /*block*/) const override { return noise_ ? noise_->num_rows() : 0; }
+  void SetHuber(double huber) override {
+    if (noise_) noise_->SetHuber(huber);
+  }
   std::vector<RowPlace> Places(int block) const override;
   bool EvaluateBlock(int block, const Eigen::VectorXd& p, GradientMethod method,
                      BlockDerivatives derivatives, BlockEvaluation* evaluation) override;
@@ -82,7 +97,8 @@ class RolloutResiduals : public LeastSquaresProblem {
   /// The residuals of the observations in the first `part` of the time.
   RolloutResiduals FirstPart(double part) const;
 
-  /// The residuals at p and, unless `jacobian` is null, their derivatives by `method`. False where
+  /// The residuals of the observations at p and, unless `jacobian` is null, their derivatives by
+  /// `method`. False where
   /// the run fails or p sets a number to a value that it may not take; message() says which.
   /// Deterministic: the same p gives the same bits.
   bool Evaluate(const Eigen::VectorXd& p, GradientMethod method, Eigen::VectorXd* residuals,
@@ -143,6 +159,7 @@ class RolloutResiduals : public LeastSquaresProblem {
   double RecordedForce(int i, double force) const;
   Eigen::RowVectorXd ForceDirectTerm(int i, double force) const;
   bool Accept(const RolloutReport& report);
+  bool WithNoise(const Eigen::VectorXd& p, Eigen::VectorXd* residuals, RowMatrixXd* jacobian);
   bool Plain();
   bool Tangent(RowMatrixXd* jacobian);
   bool Adjoint(RowMatrixXd* jacobian);
@@ -177,6 +194,8 @@ class RolloutResiduals : public LeastSquaresProblem {
   ForceRows forces_;
   RowMatrixXd by_gravity_;  ///< d gravity / d p, where accelerations are observed
   std::vector<std::string> files_;
+  std::optional<ProcessNoise> noise_;
+  std::optional<FollowedForces> followed_;
   std::vector<double> samples_;  ///< plan_.width() numbers each
   std::vector<double> rates_;    ///< of these; empty without SampleOptions::rates
   RolloutTape tape_;

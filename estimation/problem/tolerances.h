@@ -30,5 +30,12 @@ inline constexpr double kPredictionRounding = 1e-9;
 /// Of the largest inertia, or the area of a triangle: a thin ring, or two points at the ends, have
 /// exactly the largest inertia, and rounding must not count as a violation.
 inline constexpr double kInertiaRounding = 1e-9;
+/// Of the norm of all innovations, whose deviation is 1: a step of the random forces that is
+/// shorter changes no estimate by a visible part of its deviation, and the cost by its square.
+inline constexpr double kSmoothedForces = 1e-6;
+/// Of the cost with random forces: rounding of its sum.
+inline constexpr double kEqualNoiseCost = 1e-12;
+/// Of the distance of knots: one of n steps is not n − 1 steps by rounding.
+inline constexpr double kKnotRounding = 1e-9;
 
 }  // namespace tangible

@@ -39,8 +39,9 @@ bool ParseFit(const std::string& text, const std::string& file, FitFile* fit, st
 /// wrong with a parameter.
 std::unique_ptr<RecordingsProblem> MakeProblem(const FitFile& fit, std::string* error);
 
-struct Design;     // design.h
-struct Posterior;  // posterior.h
+struct Design;       // design.h
+struct MotionCheck;  // motion_check.h
+struct Posterior;    // posterior.h
 
 /// What was found beside the estimates; each may be null.
 struct FitFindings {
@@ -51,6 +52,9 @@ struct FitFindings {
   const HeldOutRuns* held_out = nullptr;
   const Design* design = nullptr;
 };
+
+/// How far the derivatives at an estimate are from those of the motion.
+OrderedJson MotionToJson(const std::vector<ParameterEntry>& entries, const MotionCheck& check);
 
 /// The result as the program writes it.
 OrderedJson ResultToJson(const RecordingsProblem& problem, const FitResult& result,

@@ -38,4 +38,10 @@ inline constexpr std::pair<const char*, ObservedEventKind> kObservedEventKinds[]
     {"slip", ObservedEventKind::kSlip},
     {"rest", ObservedEventKind::kRest}};
 
+inline constexpr std::pair<const char*, NoiseCoordinate> kNoiseCoordinates[] = {
+    {"x", NoiseCoordinate::kX},
+    {"y", NoiseCoordinate::kY},
+    {"angle", NoiseCoordinate::kAngle},
+    {"displacement", NoiseCoordinate::kDisplacement}};
+
 }  // namespace tangible

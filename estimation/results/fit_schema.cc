@@ -121,6 +121,18 @@ OrderedJson RecordingSchema() {
   return SchemaOfObject(properties, {"name", "observations"});
 }
 
+OrderedJson NoiseSchema() {
+  OrderedJson term =
+      SchemaOfObject({{"body", SchemaOfName()},
+                      {"joint", SchemaOfName()},
+                      {"coordinate", SchemaOfWords(WordsOf(kNoiseCoordinates))},
+                      {"intensity", SchemaOfAny({SchemaOfWords({"estimate"}), Positive()})},
+                      {"correlation_time", SchemaOfNumber(NumberKind::kNonNegative, "s")}},
+                     {"coordinate", "intensity"});
+  term["oneOf"] = OrderedJson::array({{{"required", {"body"}}}, {{"required", {"joint"}}}});
+  return SchemaOfArray(term, 0);
+}
+
 }  // namespace
 
 OrderedJson DesignSchema() {
@@ -140,6 +152,7 @@ OrderedJson FitSchema() {
       SchemaOfObject({{"from", SchemaOfName()}, {"to", SchemaOfName()}}, {"from", "to"}));
   properties["parameters"] = SchemaOfArray(ParameterSchema(), 0);
   properties["derivatives"] = SchemaOfWords(WordsOf(kMethods));
+  properties["process_noise"] = NoiseSchema();
   properties["loss"] = SchemaOfObject({{"huber", Positive()}}, {"huber"});
   properties["approach"] = SchemaOfWords(WordsOf(kApproaches));
   properties["segments"] = SchemaOfInteger(1, kMaxSegments);

@@ -8,6 +8,7 @@
 
 #include "tangible/estimation/fit/observed_state.h"
 #include "tangible/estimation/fit/profile.h"
+#include "tangible/estimation/fit/variance_components.h"
 #include "tangible/render/html.h"
 
 namespace tangible {
@@ -31,6 +32,7 @@ class StateFit {
   StateFit& operator=(const StateFit&) = delete;
 
   LeastSquaresProblem* problem() { return top_; }
+  RecordingsProblem* run() { return &run_; }
   RolloutResiduals* residuals() { return run_.run(0); }
 
   Eigen::VectorXd All(Eigen::VectorXd found) const {
@@ -75,7 +77,8 @@ bool FitTheStart(const FitOptions& options, const HeldOutRecording& of,
   }
   run->first_part->SetInitial(run->parameters);
   StateFit state(std::move(*run->first_part), run->parameters, free);
-  const FitResult result = Fit(OptionsOfStart(options), state.problem(), {});
+  const FitOptions how = OptionsFor(OptionsOfStart(options), *state.run());
+  const FitResult result = Fit(how, state.problem(), {});
   *run->first_part = std::move(*state.residuals());
   run->status = result.status;
   if (result.status != FitStatus::kConverged) {
@@ -95,17 +98,22 @@ HeldOutRun Predict(const FitInput& input, const RecordingsProblem& problem,
   run.name = of.recording.name;
   run.state_from = of.state_from;
   run.place = of.place;
-  ParameterizedScene scene;
   ParameterError fault;
-  if (!scene.Create(one.scene, one.points, one.parameters, &fault, one.instruments)) {
+  // Without observations there are no random forces to be found.
+  if (one.observations.empty()) one.process_noise.clear();
+  run.first_part = MakeRun(one, &fault);
+  if (!run.first_part) {
     run.status = FitStatus::kFailed;
     run.message = fault.what;
     return run;
   }
-  run.entries = scene.entries();
+  if (run.first_part->noise() != nullptr) {
+    run.first_part->noise()->SetIntensities(
+        problem.recordings().front().residuals.noise()->intensities());
+    run.first_part->SetHuber(input.options().huber);
+  }
+  run.entries = run.first_part->entries();
   run.parameters = KnownValues(run.entries, problem, estimate);
-  run.first_part.emplace(std::move(scene), one.observations, one.channels);
-  run.first_part->SetFiles(one.files);
   const std::vector<bool> free = OwnStates(one.parameters, input.scopes);
   for (size_t k = 0; k < free.size(); ++k) {
     if (free[k]) run.fitted.push_back(static_cast<int>(k));
@@ -121,7 +129,8 @@ HeldOutRun Predict(const FitInput& input, const RecordingsProblem& problem,
     const auto count = static_cast<double>(run.residuals.size());
     run.residual_rms = std::sqrt(run.residuals.squaredNorm() / count);
   }
-  run.later = PredictLater(one, run.parameters, of.state_from, std::move(of.later));
+  run.later =
+      PredictLater(one, run.parameters, of.state_from, std::move(of.later), &*run.first_part);
   if (run.message.empty() && !run.later.score.message.empty()) {
     run.status = FitStatus::kFailed;
     run.message =

@@ -124,18 +124,21 @@ PredictionScore ScorePrediction(const std::vector<PredictedRun>& runs) {
 }
 
 LaterObservations PredictLater(const FitProblem& problem, const Eigen::VectorXd& estimate,
-                               double from, std::vector<Observation> later) {
+                               double from, std::vector<Observation> later,
+                               const RolloutResiduals* before) {
   LaterObservations result;
   result.observations = std::move(later);
   result.score.from = from;
   ParameterizedScene scene;
   ParameterError fault;
-  if (!scene.Create(problem.scene, problem.points, problem.parameters, &fault,
-                    problem.instruments)) {
+  const bool driven = before != nullptr && before->noise() != nullptr;
+  if (!scene.Create(driven ? WithNoiseForces(problem.process_noise, problem.scene) : problem.scene,
+                    problem.points, problem.parameters, &fault, problem.instruments)) {
     result.score.message = fault.what;
     return result;
   }
   RolloutResiduals run(std::move(scene), result.observations, problem.channels);
+  if (driven) run.Follow(*before);
   if (!run.Evaluate(estimate, problem.options.derivatives, &result.residuals, nullptr)) {
     result.score.message = run.message();
     result.residuals.resize(0);
@@ -206,7 +209,7 @@ PredictedRecordings PredictLater(const FitInput& input, const RecordingsProblem&
     LaterObservations& run = result.runs.emplace_back();
     if (later[b].empty()) continue;
     run = PredictLater(recording.problem, problem.ParametersOf(block, estimate), from,
-                       std::move(later[b]));
+                       std::move(later[b]), &problem.recordings()[b].residuals);
     if (!run.score.message.empty() && result.score.message.empty()) {
       result.score.message = problem.BlockName(block) + run.score.message;
     }

@@ -47,9 +47,11 @@ struct LaterObservations {
 /// Moves the observations after `from` out of `observations`; both lists keep their order.
 std::vector<Observation> TakeLater(double from, std::vector<Observation>* observations);
 
-/// Runs the problem's scene at `estimate` until the last of `later`, and scores it there.
+/// Runs the problem's scene at `estimate` until the last of `later`, and scores it there. The
+/// random forces that a run `before` has found, if it has any, act until its end.
 LaterObservations PredictLater(const FitProblem& problem, const Eigen::VectorXd& estimate,
-                               double from, std::vector<Observation> later);
+                               double from, std::vector<Observation> later,
+                               const RolloutResiduals* before = nullptr);
 
 /// The observations of a run after T, by channels (none: directly), and their residuals in
 /// multiples of sigma.

@@ -7,6 +7,7 @@
 
 #include "tangible/estimation/fit/profile.h"
 #include "tangible/estimation/results/design_output.h"
+#include "tangible/estimation/results/noise_output.h"
 #include "tangible/estimation/results/posterior_output.h"
 #include "tangible/estimation/results/residual_summary.h"
 #include "tangible/render/html.h"
@@ -482,7 +483,7 @@ std::string RecordingTable(const RecordingsProblem& problem, const FitResult& re
   const size_t all = problem.recordings().size();
   rows.reserve(std::min(all, kMostRows));
   for (int b = 0; b < static_cast<int>(std::min(all, kMostRows)); ++b) {
-    rows.push_back({problem.recordings()[b].name, std::to_string(problem.num_rows(b)),
+    rows.push_back({problem.recordings()[b].name, std::to_string(problem.num_observation_rows(b)),
                     CompactNumber(problem.weight(b)),
                     CompactNumber(RmsOfRecording(problem, result.residuals, b), 4)});
   }
@@ -520,20 +521,21 @@ std::string FitReport(const std::string& title, const RecordingsProblem& problem
   const std::vector<ParameterEntry>& entries = problem.entries();
   const ResidualSummary summary = SummarizeResiduals(problem, result.residuals);
   const PredictionScore* const score = findings.later == nullptr ? nullptr : &findings.later->score;
-  return HtmlPage(
-      heading, "<h1>" + HtmlEscape(heading) + "</h1>\n<h2>Estimates</h2>\n" +
-                   EstimateTable(entries, result) + Warnings(result.uncertainty) +
-                   ProfilePlots(entries, result) +
-                   (findings.posterior ? PosteriorPart(entries, *findings.posterior) : "") +
-                   (findings.design ? DesignPart(entries, *findings.design) : "") +
-                   CombinationTable(result.uncertainty) + SpreadTable(findings.components) +
-                   SummaryTable(result) + RecordingTable(problem, result) +
-                   NoiseTable(findings.components) + RadiusTable(result.certificate) +
-                   CorrelationTable(entries, result) + StepTable(entries, findings.check) +
-                   PredictionPart("Prediction", score) + HeldOutPart(findings.held_out) +
-                   StartTable(result) + IterationPlots(entries, result) + ResidualTable(summary) +
-                   OutlierTable(summary) +
-                   SeriesPlots(CollectSeries(problem, result), summary.series.size()));
+  return HtmlPage(heading,
+                  "<h1>" + HtmlEscape(heading) + "</h1>\n<h2>Estimates</h2>\n" +
+                      EstimateTable(entries, result) + Warnings(result.uncertainty) +
+                      ProfilePlots(entries, result) +
+                      (findings.posterior ? PosteriorPart(entries, *findings.posterior) : "") +
+                      (findings.design ? DesignPart(entries, *findings.design) : "") +
+                      CombinationTable(result.uncertainty) + ProcessNoisePart(findings.components) +
+                      SpreadTable(findings.components) + SummaryTable(result) +
+                      RecordingTable(problem, result) + NoiseTable(findings.components) +
+                      RadiusTable(result.certificate) + CorrelationTable(entries, result) +
+                      StepTable(entries, findings.check) + PredictionPart("Prediction", score) +
+                      HeldOutPart(findings.held_out) + StartTable(result) +
+                      IterationPlots(entries, result) + ResidualTable(summary) +
+                      OutlierTable(summary) +
+                      SeriesPlots(CollectSeries(problem, result), summary.series.size()));
 }
 
 }  // namespace tangible

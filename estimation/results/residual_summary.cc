@@ -152,8 +152,8 @@ ResidualSummary SummarizeResiduals(const RecordingsProblem& problem,
 double RmsOfRecording(const RecordingsProblem& problem, const Eigen::VectorXd& values,
                       int recording) {
   Eigen::Index first = 0;
-  for (int block = 0; block < recording; ++block) first += problem.num_rows(block);
-  const Eigen::Index rows = problem.num_rows(recording);
+  for (int block = 0; block < recording; ++block) first += problem.num_observation_rows(block);
+  const Eigen::Index rows = problem.num_observation_rows(recording);
   if (values.size() < first + rows) return std::nan("");
   return std::sqrt(values.segment(first, rows).squaredNorm() / static_cast<double>(rows));
 }

@@ -4,8 +4,10 @@
 #include <cmath>
 #include <map>
 
+#include "tangible/estimation/fit/motion_check.h"
 #include "tangible/estimation/results/design_output.h"
 #include "tangible/estimation/results/fit_json.h"
+#include "tangible/estimation/results/noise_output.h"
 #include "tangible/estimation/results/posterior_output.h"
 #include "tangible/estimation/results/residual_summary.h"
 
@@ -333,7 +335,7 @@ OrderedJson RecordingsToJson(const RecordingsProblem& problem, const FitResult& 
   OrderedJson all = OrderedJson::array();
   for (int b = 0; b < problem.num_blocks(); ++b) {
     all.push_back({{"name", problem.recordings()[b].name},
-                   {"residuals", problem.num_rows(b)},
+                   {"residuals", problem.num_observation_rows(b)},
                    {"weight", problem.weight(b)},
                    {"residual_rms", Number(RmsOfRecording(problem, result.residuals, b))}});
     if (later != nullptr) {
@@ -388,6 +390,18 @@ OrderedJson EstimatesToJson(const RecordingsProblem& problem, const FitResult& r
 
 }  // namespace
 
+OrderedJson MotionToJson(const std::vector<ParameterEntry>& entries, const MotionCheck& check) {
+  if (!check.message.empty()) return {{"message", check.message}};
+  OrderedJson differences = OrderedJson::array();
+  for (size_t k = 0; k < entries.size(); ++k) {
+    differences.push_back({{"parameter", entries[k].name},
+                           {"difference", check.difference[static_cast<Eigen::Index>(k)]}});
+  }
+  return {{"differences", differences},
+          {"difference_max", check.difference.size() == 0 ? 0.0 : check.difference.maxCoeff()},
+          {"verdict", check.verdict}};
+}
+
 OrderedJson ResultToJson(const RecordingsProblem& problem, const FitResult& result,
                          const FitFindings& findings) {
   const ResidualSummary summary = SummarizeResiduals(problem, result.residuals);
@@ -418,6 +432,10 @@ OrderedJson ResultToJson(const RecordingsProblem& problem, const FitResult& resu
   }
   if (findings.components != nullptr && !findings.components->spreads.empty()) {
     json["spreads"] = SpreadsToJson(findings.components->spreads);
+  }
+  if (findings.components != nullptr && !findings.components->forces.empty()) {
+    json["process_noise"] = ProcessNoiseToJson(*findings.components);
+    json["smoothed_states"] = SmoothedStatesToJson(*findings.components);
   }
   return json;
 }

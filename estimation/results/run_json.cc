@@ -158,7 +158,7 @@ class RunReader {
   bool Read() {
     root_.ExpectKeys({"scene", "observations", "recordings", "initial", "points", "sensors",
                       "cameras", "clocks", "events", "links", "parameters", "derivatives", "loss",
-                      "approach", "segments", "starts", "seed"});
+                      "approach", "segments", "starts", "seed", "process_noise"});
     const std::string scene_file = JoinPath(folder_, root_.At("scene").String());
     if (!root_.ok()) {
       return true;
@@ -181,10 +181,77 @@ class RunReader {
     ExpandLinks();
     problem_->options = ReadOptions(root_);
     CheckShooting();
+    if (root_.Has("process_noise")) ReadNoise();
     return ReadObservationFiles();
   }
 
  private:
+  void ReadNoise() {
+    const JsonReader list = root_.At("process_noise");
+    const int count = list.ExpectArray("an array of {body or joint, coordinate, intensity}");
+    for (int i = 0; i < count; ++i) problem_->process_noise.push_back(ReadNoiseTerm(list.At(i)));
+    if (!root_.ok()) return;
+    if (const auto fault = CheckNoise(problem_->process_noise, problem_->scene)) {
+      const JsonReader term = list.At(fault->term);
+      (fault->key.empty() ? term : term.At(fault->key)).Fail(fault->what);
+    }
+    const auto refuse = [this](const char* key, const char* what) {
+      if (root_.ok()) root_.At(key).Fail(std::string(what) + " beside process_noise");
+    };
+    const FitOptions& options = problem_->options;
+    if (count == 0) return;
+    if (options.derivatives != GradientMethod::kTangent) refuse("derivatives", "expected tangent");
+    if (options.segments > 1) refuse("segments", "expected 1");
+    if (options.approach == FitApproach::kWindows) refuse("approach", "expected auto or plain");
+    for (const Sensor& sensor : problem_->instruments.sensors) {
+      if (sensor.estimate_sigma) refuse("sensors", "expected no estimate_sigma");
+    }
+  }
+
+  static NoiseTerm ReadNoiseTerm(const JsonReader& json) {
+    json.ExpectKeys({"body", "joint", "coordinate", "intensity", "correlation_time"},
+                    " of process_noise");
+    NoiseTerm term;
+    if (json.Has("body")) term.body = json.At("body").String();
+    if (json.Has("joint")) term.joint = json.At("joint").String();
+    term.coordinate = json.At("coordinate").Choice(kNoiseCoordinates);
+    const JsonReader intensity = json.At("intensity");
+    if (intensity.IsNumber()) {
+      term.intensity = intensity.Number(NumberKind::kPositive);
+    } else if (!intensity.IsString() || intensity.String() != "estimate") {
+      intensity.FailExpected("\"estimate\" or a number > 0");
+    }
+    if (json.Has("correlation_time")) {
+      term.correlation_time = json.At("correlation_time").Number(NumberKind::kNonNegative);
+    }
+    return term;
+  }
+
+  /// As WhyNoNoise.
+  void CheckNoiseRun() {
+    if (problem_->process_noise.empty()) return;
+    const JsonReader place = root_.At("process_noise");
+    for (const FitParameter& parameter : problem_->parameters) {
+      for (const ParameterSet& set : parameter.sets) {
+        if (MovesTimes(set.path)) {
+          place.Fail("expected none where a delay or clock is a parameter, got " + set.path);
+        }
+        if (set.path.rfind("forces/*", 0) == 0) {
+          place.Fail("expected none where a parameter sets all forces, got " + set.path);
+        }
+      }
+    }
+    double last = 0.0;
+    for (const Observation& one : problem_->observations) {
+      if (one.event >= 0 || IsAcceleration(one.coordinate) || IsForce(one.coordinate)) {
+        place.Fail("expected none where times of events, accelerations or forces are observed");
+        return;
+      }
+      last = std::max(last, one.time);
+    }
+    if (!(last > 0.0)) place.Fail("expected none where nothing is observed after the start");
+  }
+
   /// "links/NAME/length" becomes what it moves.
   void ExpandLinks() {
     if (!root_.ok()) return;
@@ -329,6 +396,7 @@ class RunReader {
     if (root_.ok()) CheckWholeRun();
     if (root_.ok()) CheckForceTimes();
     if (is_part && root_.ok()) Cut();
+    if (root_.ok()) CheckNoiseRun();
     return true;
   }
 

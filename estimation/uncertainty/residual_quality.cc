@@ -11,10 +11,15 @@ ResidualQuality JudgeResiduals(const LeastSquaresProblem& problem,
   ResidualQuality quality;
   std::vector<ResidualPlace> places;
   std::vector<double> values;
+  double squares = 0.0;  // of random forces
   for (size_t b = 0; b < blocks.size(); ++b) {
     const int block = static_cast<int>(b);
     const std::vector<RowPlace> rows = problem.Places(block);
-    for (int i = 0; i < problem.num_observation_rows(block); ++i) {
+    const int observed = problem.num_observation_rows(block);
+    const int forces = problem.num_noise_rows(block);
+    squares += blocks[b].residuals.segment(observed, forces).squaredNorm();
+    quality.has_forces = quality.has_forces || forces > 0;
+    for (int i = 0; i < observed; ++i) {
       values.push_back(blocks[b].residuals[i]);
       if (i < static_cast<int>(rows.size())) {
         places.push_back({block, rows[i].series, rows[i].time, rows[i].least});
@@ -26,11 +31,12 @@ ResidualQuality JudgeResiduals(const LeastSquaresProblem& problem,
   const double count = static_cast<double>(data.size());
   const double freedom = count - static_cast<double>(num_free);
   quality.residual_rms = std::sqrt(data.squaredNorm() / count);
-  quality.reduced_chi_square =
-      freedom > 0.0 ? data.squaredNorm() / freedom : std::numeric_limits<double>::quiet_NaN();
+  quality.reduced_chi_square = freedom > 0.0 ? (data.squaredNorm() + squares) / freedom
+                                             : std::numeric_limits<double>::quiet_NaN();
   quality.too_large =
       quality.reduced_chi_square > 1.0 + kChiSquareDeviations * std::sqrt(2.0 / freedom);
-  if (places.size() == values.size()) {
+  // Smoothed residuals are correlated where the model is right.
+  if (places.size() == values.size() && !quality.has_forces) {
     quality.whiteness = TestWhiteness(data, places);
     quality.correlated = quality.whiteness.p_value < kWhitenessProbability &&
                          std::abs(quality.whiteness.correlation) > kWhitenessCorrelation;

@@ -13,11 +13,14 @@
 namespace tangible {
 
 struct ResidualQuality {
-  double residual_rms = 0.0;        ///< in multiples of sigma
-  double reduced_chi_square = 0.0;  ///< Σ r² / (N − free parameters); NaN where N is not larger
+  double residual_rms = 0.0;  ///< in multiples of sigma
+  /// Σ r² / (N − free parameters), with random forces (Σ r² + Σ ε²) / (N − free parameters); NaN
+  /// where N is not larger.
+  double reduced_chi_square = 0.0;
   Whiteness whiteness;
   bool too_large = false;   ///< larger than sigma explains
-  bool correlated = false;  ///< in time
+  bool correlated = false;  ///< in time; not tested with random forces
+  bool has_forces = false;  ///< random ones (process_noise.h)
   bool DoesNotFit() const { return too_large || correlated; }
   /// Whether another minimum may fit better. Residuals that are large but independent mean that
   /// sigma is too small; the correlation of few residuals is not known.

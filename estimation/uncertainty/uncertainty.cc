@@ -334,8 +334,7 @@ class Estimator {
     for (size_t b = 0; b < blocks_.size(); ++b) {
       const int block = static_cast<int>(b);
       const double root = std::sqrt(problem_.weight(block));
-      for (Eigen::Index i = problem_.num_observation_rows(block); i < blocks_[b].residuals.size();
-           ++i) {
+      for (Eigen::Index i = NumDataRows(block); i < blocks_[b].residuals.size(); ++i) {
         Eigen::VectorXd moved = Eigen::VectorXd::Zero(estimate_.size());
         for (int local = 0; local < layout_.num_local(block); ++local) {
           const int k = layout_.ParameterOf(block, local);
@@ -379,12 +378,19 @@ class Estimator {
         Eigen::Map<const Eigen::VectorXd>(all.data(), static_cast<Eigen::Index>(all.size()));
   }
 
+  /// Rows of observations and of random forces; what follows are priors.
+  Eigen::Index NumDataRows(int block) const {
+    return problem_.num_observation_rows(block) + problem_.num_noise_rows(block);
+  }
+
   void FillRobust() {
     robust_ = RowMatrixXd::Constant(all_.rows(), all_.cols(), kNaN);
     std::vector<size_t> of_recordings;
     RowMatrixXd prior(0, static_cast<Eigen::Index>(shared_.size()));
     const std::vector<RecordingRows> recordings = Recordings(&of_recordings, &prior);
-    if (recordings.empty()) {
+    // Smoothed residuals are correlated where the model is right.
+    const bool too_few = result_.has_forces && recordings.size() < kFewRecordings;
+    if (recordings.empty() || too_few) {
       return;
     }
     const RobustCovariance robust =
@@ -427,7 +433,7 @@ class Estimator {
     for (size_t b = 0; b < blocks_.size(); ++b) {
       const int block = static_cast<int>(b);
       BlockPart& part = parts_[b];
-      const Eigen::Index data = problem_.num_observation_rows(block);
+      const Eigen::Index data = NumDataRows(block);
       const Eigen::Index priors = blocks_[b].residuals.size() - data;
       if (data == 0) {
         const Eigen::Index before = prior->rows();
@@ -436,7 +442,7 @@ class Estimator {
         continue;
       }
       const std::vector<RowPlace> places = problem_.Places(block);
-      if (static_cast<Eigen::Index>(places.size()) != data) {
+      if (static_cast<int>(places.size()) != problem_.num_observation_rows(block)) {
         return {};
       }
       RecordingRows rows;
@@ -444,6 +450,7 @@ class Estimator {
       for (const RowPlace& place : places) {
         rows.times.push_back(place.time);
       }
+      rows.times.resize(static_cast<size_t>(data), 0.0);
       rows.weight = problem_.weight(block);
       rows.residuals = blocks_[b].residuals.head(data);
       rows.shared = part.shared_rows.topRows(data);
@@ -504,7 +511,10 @@ Uncertainty EstimateUncertainty(const LeastSquaresProblem& problem, const Eigen:
 std::string DescribeRobust(const Uncertainty& uncertainty) {
   switch (uncertainty.robust_method) {
     case RobustMethod::kNone:
-      return "robust intervals: none, for there are no more residuals than parameters";
+      return uncertainty.has_forces
+                 ? "intervals from sigma and the random forces; robust ones from " +
+                       std::to_string(kFewRecordings) + " recordings on"
+                 : "robust intervals: none, for there are no more residuals than parameters";
     case RobustMethod::kRecordings:
       return "robust intervals: jackknife over the recordings, Student's t";
     case RobustMethod::kTime:

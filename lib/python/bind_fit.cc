@@ -18,6 +18,7 @@
 #include "tangible/estimation/results/design_output.h"
 #include "tangible/estimation/results/fit_json.h"
 #include "tangible/estimation/results/fitted_scene.h"
+#include "tangible/estimation/results/noise_output.h"
 #include "tangible/estimation/results/prediction.h"
 #include "tangible/estimation/results/report.h"
 #include "tangible/python/binding.h"
@@ -136,6 +137,12 @@ class FitProblemOf {
   Found Do(const Wanted& wanted) {
     SetOptions(wanted.max_iterations, 0);
     SetProfiles(wanted.profiles);
+    const std::string refused =
+        RefusedWithNoise(*problem_, {{"design", !wanted.design.empty()},
+                                     {"profile", !wanted.profiles.empty()},
+                                     {"checkpoint", !wanted.checkpoint.empty()},
+                                     {"discretisation_check", wanted.discretisation_check}});
+    if (!refused.empty()) throw Error(refused);
     std::vector<std::vector<Observation>> held_back = HoldBack(wanted.predict_from);
     const DesignRequest request = ReadDesign(wanted);
     const std::unique_ptr<FitCheckpoint> checkpoint = Open(wanted.checkpoint);
@@ -180,7 +187,8 @@ class FitProblemOf {
       findings.design = &*design;
     }
     OrderedJson all = ResultToJson(*problem_, result, findings);
-    all["certificate"] = any ? ToJson(result.certificate) : OrderedJson(nullptr);
+    all["certificate"] = any && !result.certificate.verdict.empty() ? ToJson(result.certificate)
+                                                                    : OrderedJson(nullptr);
     Found found{all.dump(), "", "", {}};
     if (!any) return found;
     found.report = FitReport(fit_.path, *problem_, result, findings);

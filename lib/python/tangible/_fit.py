@@ -120,6 +120,14 @@ class Residuals:
         return found
 
 
+def _arrays(columns: Mapping[str, Any]) -> dict[str, Any]:
+    """Lists of numbers as arrays, with nan for null."""
+    return {
+        key: np.array([np.nan if x is None else x for x in value]) if isinstance(value, list) else value
+        for key, value in columns.items()
+    }
+
+
 class FitResult:
     """What a fit has found.
 
@@ -251,6 +259,25 @@ class FitResult:
         `candidates` its `widths`, `gain`, `takes`, ..., and which is `d_optimal`, `a_optimal`,
         `narrowest` of each parameter; empty unless candidates were given."""
         return dict(self.data.get("design") or {})
+
+    @property
+    def process_noise(self) -> list[dict[str, Any]]:
+        """Of each random force that `process_noise` asks for its `intensity` (in `unit`),
+        `interval_95` where it is `estimated`, and `forces`: of each recording arrays of `time`,
+        `force`, `standard_deviation`, `coordinate` and `rate`."""
+        return [
+            {**one, "forces": [_arrays(course) for course in one["forces"]]}
+            for one in self.data.get("process_noise") or []
+        ]
+
+    @property
+    def smoothed_states(self) -> list[dict[str, Any]]:
+        """With `process_noise`, of each recording `time`, `states` and `standard_deviations`, which
+        are arrays by name ("ball/x")."""
+        return [
+            {**_arrays(one), **{key: _arrays(one[key]) for key in ("states", "standard_deviations")}}
+            for one in self.data.get("smoothed_states") or []
+        ]
 
     @property
     def covariance(self) -> Floats:
