@@ -233,17 +233,22 @@ int FindOutlineFeatures(const Outline& outline, int run, const ShapeView<double>
   return internal::OutlinePair(outline, run, other, relative, side).Find(max_gap, features);
 }
 
-int FindHullFeatures(const Outline& outline, const ShapeView<double>& plane,
+int FindPlaneFeature(const Outline& outline, int run, const ShapeView<double>& plane,
                      const Pose<double>& pose_a, const Pose<double>& pose_b, SeamSide side,
                      double max_gap, ContactFeature features[2]) {
   const bool is_first = side == SeamSide::kFirst;
-  const ShapeView<double> hull = outline.Hull();
-  const int count = FindContactFeatures(is_first ? hull : plane, pose_a, is_first ? plane : hull,
-                                        pose_b, max_gap, features);
-  for (int k = 0; k < count; ++k) {
-    int& vertex = is_first ? features[k].a : features[k].b;
-    vertex = outline.VertexOfHull(vertex);
-  }
+  const OutlineRun& of = outline.run(run);
+  if (of.before != OutlineJoint::kConvex) return 0;
+  const Vector2<double> normal(plane.numbers[0], plane.numbers[1]);
+  const Vector2<double> down =
+      (is_first ? pose_b : pose_a).rotation * Vector2<double>(-normal / normal.norm());
+  const internal::NormalCone cone{outline.run(outline.Previous(run)).normal, of.normal};
+  if (!cone.Faces((is_first ? pose_a : pose_b).rotation.Inverse(down))) return 0;
+  const double point[2] = {of.start.x(), of.start.y()};
+  const ShapeView<double> corner{ShapeType::kPolygon, point, 2};
+  const int count = FindContactFeatures(is_first ? corner : plane, pose_a,
+                                        is_first ? plane : corner, pose_b, max_gap, features);
+  for (int k = 0; k < count; ++k) (is_first ? features[k].a : features[k].b) = of.first;
   return count;
 }
 

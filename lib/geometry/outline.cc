@@ -113,7 +113,6 @@ void Outline::BuildTree(const ShapeView<double>& shape) {
 }
 
 // The lower chain from the leftmost vertex and the upper one back to it (Andrew's algorithm).
-// Vertices within rounding of a side belong to no corner of the hull.
 void Outline::BuildHull(const ShapeView<double>& shape) {
   const int size = NumVertices(shape.type, shape.num_numbers);
   std::vector<int> order(static_cast<size_t>(size));
@@ -122,24 +121,27 @@ void Outline::BuildHull(const ShapeView<double>& shape) {
     const Vector2<double> x = Vertex(shape, i), y = Vertex(shape, j);
     return x.x() < y.x() || (x.x() == y.x() && x.y() < y.y());
   });
-  const auto turns_left = [&](int i, int j, int k) {
-    const Vector2<double> in = Vertex(shape, j) - Vertex(shape, i);
-    const Vector2<double> out = Vertex(shape, k) - Vertex(shape, j);
-    return Cross(in, out) > kLengthRounding * in.norm() * out.norm();
-  };
-  const auto add = [&](int vertex, size_t least) {
-    while (hull_.size() > least && !turns_left(hull_[hull_.size() - 2], hull_.back(), vertex)) {
-      hull_.pop_back();
+  std::vector<Vector2<double>> hull;
+  const auto add = [&](const Vector2<double>& x, size_t least) {
+    while (hull.size() > least && !(Cross(Vector2<double>(hull.back() - hull[hull.size() - 2]),
+                                          Vector2<double>(x - hull.back())) > 0.0)) {
+      hull.pop_back();
     }
-    hull_.push_back(vertex);
+    hull.push_back(x);
   };
-  for (const int vertex : order) add(vertex, 1);
-  const size_t lower = hull_.size();
-  for (size_t i = order.size() - 1; i-- > 0;) add(order[i], lower);
-  hull_.pop_back();
-  for (const int vertex : hull_) {
-    const Vector2<double> x = Vertex(shape, vertex);
-    hull_numbers_.insert(hull_numbers_.end(), {x.x(), x.y()});
+  for (const int vertex : order) add(Vertex(shape, vertex), 1);
+  const size_t lower = hull.size();
+  for (size_t i = order.size() - 1; i-- > 0;) add(Vertex(shape, order[i]), lower);
+  hull.pop_back();
+  const double room = kNearHull * (hull[lower - 1] - hull[0]).norm();
+  for (int run = 0; run < num_runs(); ++run) {
+    const Vector2<double>& x = runs_[run].start;
+    bool is_near = false;
+    for (size_t i = 0; i < hull.size() && !is_near; ++i) {
+      const Vector2<double> along = hull[(i + 1) % hull.size()] - hull[i];
+      is_near = Cross(along, Vector2<double>(x - hull[i])) <= room * along.norm();
+    }
+    if (is_near && runs_[run].before == OutlineJoint::kConvex) hull_runs_.push_back(run);
   }
 }
 

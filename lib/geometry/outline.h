@@ -52,12 +52,9 @@ class Outline {
   explicit Outline(const ShapeView<double>& shape);
 
   bool IsPolygon() const { return is_polygon_; }
-  /// The convex hull of a polygon, which is what a half-plane touches: a convex polygon, and which
-  /// vertex of the outline each of its vertices is.
-  ShapeView<double> Hull() const {
-    return {ShapeType::kPolygon, hull_numbers_.data(), static_cast<int>(hull_numbers_.size())};
-  }
-  int VertexOfHull(int i) const { return hull_[static_cast<size_t>(i)]; }
+  /// The runs of a polygon that start at its convex hull, or at most kNearHull inside: their starts
+  /// are what a half-plane touches.
+  const std::vector<int>& hull_runs() const { return hull_runs_; }
   /// Whether a point is in a polygon. O(log n + the edges beside it).
   bool Contains(const Vector2<double>& x) const;
   /// The vertex at which a run ends, and its place.
@@ -118,8 +115,7 @@ class Outline {
   std::vector<double> along_;  ///< the foot of each edge's start over its run
   int num_edges_ = 0;
   bool is_closed_ = false, is_polygon_ = false;
-  std::vector<int> hull_;
-  std::vector<double> hull_numbers_;
+  std::vector<int> hull_runs_;
   int num_leaves_ = 1;      ///< a power of two
   std::vector<Aabb> tree_;  ///< a heap whose leaves are the boxes of the runs
 };
@@ -135,8 +131,8 @@ int FindOutlineFeatures(const Outline& outline, int run, const ShapeView<double>
                         const Pose<double>& pose_b, SeamSide side, double max_gap,
                         ContactFeature features[2]);
 
-/// The same for the convex hull of a polygon and a half-plane.
-int FindHullFeatures(const Outline& outline, const ShapeView<double>& plane,
+/// The same for the start of a run of a polygon and a half-plane.
+int FindPlaneFeature(const Outline& outline, int run, const ShapeView<double>& plane,
                      const Pose<double>& pose_a, const Pose<double>& pose_b, SeamSide side,
                      double max_gap, ContactFeature features[2]);
 

@@ -274,22 +274,34 @@ TEST(OutlineRunsTest, WhatIsInAConcavePolygonIsOverItsNearestEdge) {
   EXPECT_TRUE(outline.Contains(Vector2<double>(0.5, 1.0)));
 }
 
-TEST(OutlineRunsTest, AHalfPlaneTouchesTheHull) {
-  // An arch, whose feet stand on the plane; its vertex 3 begins the level inner edge.
+TEST(OutlineRunsTest, AHalfPlaneTouchesTheCornersOfTheHull) {
+  // An arch, whose feet stand on the plane; its inner edge does not, nor do corners that are not
+  // below others.
   const Numbers arch = {-2, 0, -1, 0, -1, 1, 1, 1, 1, 0, 2, 0, 2, 2, -2, 2};
   const Outline outline(PolygonOf(arch));
+  EXPECT_EQ(outline.hull_runs(), (std::vector<int>{0, 1, 4, 5, 6, 7}));
   const Numbers plane = {0.0, 1.0, 0.0};
   const Pose<double> at_rest(Vector2<double>(0.0, 0.0), 0.0);
   for (const double angle : {0.0, 1e-3, -1e-3}) {
-    ContactFeature features[2];
     const Pose<double> pose(Vector2<double>(0.0, 0.01), angle);
-    ASSERT_EQ(FindHullFeatures(outline, {ShapeType::kHalfPlane, plane.data(), 3}, pose, at_rest,
-                               SeamSide::kFirst, 1.0, features),
-              2);
-    std::vector<int> vertices = {features[0].a, features[1].a};
-    std::sort(vertices.begin(), vertices.end());
-    EXPECT_EQ(vertices, (std::vector<int>{0, 5}));
+    std::vector<int> vertices;
+    for (const int run : outline.hull_runs()) {
+      ContactFeature features[2];
+      if (FindPlaneFeature(outline, run, {ShapeType::kHalfPlane, plane.data(), 3}, pose, at_rest,
+                           SeamSide::kFirst, 1.0, features) == 0) {
+        continue;
+      }
+      EXPECT_EQ(features[0].kind, FeatureKind::kVertexPlane);
+      vertices.push_back(features[0].a);
+    }
+    EXPECT_EQ(vertices, (std::vector<int>{0, 1, 4, 5}));
   }
+  // Feet that are shorter by a millionth count, by a hundredth not.
+  Numbers uneven = arch;
+  uneven[3] = 3e-6;
+  EXPECT_EQ(Outline(PolygonOf(uneven)).hull_runs().size(), 6u);
+  uneven[3] = 0.02;
+  EXPECT_EQ(Outline(PolygonOf(uneven)).hull_runs().size(), 5u);
   EXPECT_FALSE(IsConcavePolygon({ShapeType::kPolygon, arch.data() + 8, 6}));
 }
 

@@ -23,7 +23,8 @@ int FindFeaturesAtSeams(const Model<double>& model, int a, const Pose<double>& p
     const Outline& outline = outline_a != nullptr ? *outline_a : *outline_b;
     const ShapeView<double>& other = outline_a != nullptr ? shape_b : shape_a;
     if (other.type == ShapeType::kHalfPlane) {
-      return FindHullFeatures(outline, other, pose_a, pose_b, side, max_gap, features);
+      return FindPlaneFeature(outline, outline_a != nullptr ? run_a : run_b, other, pose_a, pose_b,
+                              side, max_gap, features);
     }
     return FindOutlineFeatures(outline, outline_a != nullptr ? run_a : run_b, shape_a, pose_a,
                                shape_b, pose_b, side, max_gap, features);

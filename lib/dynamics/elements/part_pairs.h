@@ -81,13 +81,18 @@ void ForEachPartNear(const Model<double>& model, int a, const Pose<double>& pose
   }
   const BodyIndex& lined = structure.bodies[is_first ? a : b];
   const BodyIndex& other = structure.bodies[is_first ? b : a];
-  if (other.shape == ShapeType::kHalfPlane) {
-    structure.ForEachPartPair(a, b, visit);
-    return;
-  }
   const auto visit_both = [&](int of_lined, int of_other) {
     visit(is_first ? PartPair{of_lined, of_other} : PartPair{of_other, of_lined});
   };
+  if (other.shape == ShapeType::kHalfPlane) {
+    for (const int run : outline->hull_runs()) visit_both(lined.PartOfRun(run), 0);
+    for (int k = 1; k <= other.num_contact_points; ++k) {
+      outline->ForEachRun(BoxInFrame(is_first ? pose_a : pose_b, is_first ? box_b : box_a, reach),
+                          [&](int run) { visit_both(lined.PartOfRun(run), k); });
+    }
+    for (int k = 1; k <= lined.num_contact_points; ++k) visit_both(k, 0);
+    return;
+  }
   const Outline* const second = is_first ? model.OutlineOf(b) : nullptr;
   const Aabb box = BoxInFrame(is_first ? pose_a : pose_b, is_first ? box_b : box_a, reach);
   const auto visit_others = [&](const auto& visit_part) {
@@ -110,20 +115,18 @@ void ForEachPartNear(const Model<double>& model, int a, const Pose<double>& pose
 template <typename Visit>
 void ForEachPart(const Model<double>& model, int a, int b, const Visit& visit) {
   const ModelStructure& structure = *model.structure;
-  const auto runs = [&](int body, int other) {
+  const auto runs = [&](int body) {
     const Outline* const outline = model.OutlineOf(body);
-    return outline == nullptr || structure.bodies[other].shape == ShapeType::kHalfPlane
-               ? 1
-               : outline->num_runs();
+    return outline == nullptr ? 1 : outline->num_runs();
   };
   const BodyIndex& first = structure.bodies[a];
   const BodyIndex& second = structure.bodies[b];
-  for (int i = 0; i < runs(a, b); ++i) {
-    for (int j = 0; j < runs(b, a); ++j) visit(PartPair{first.PartOfRun(i), second.PartOfRun(j)});
+  for (int i = 0; i < runs(a); ++i) {
+    for (int j = 0; j < runs(b); ++j) visit(PartPair{first.PartOfRun(i), second.PartOfRun(j)});
     for (int k = 1; k <= second.num_contact_points; ++k) visit(PartPair{first.PartOfRun(i), k});
   }
   for (int k = 1; k <= first.num_contact_points; ++k) {
-    for (int j = 0; j < runs(b, a); ++j) visit(PartPair{k, second.PartOfRun(j)});
+    for (int j = 0; j < runs(b); ++j) visit(PartPair{k, second.PartOfRun(j)});
   }
 }
 
