@@ -304,7 +304,7 @@ void SceneMaker::Ends() {
 }
 
 void SceneMaker::RollingFriction() {
-  if (seed_ % 4 != 3) return;
+  if (seed_ % 8 != 7) return;
   RandomNumbers random(0x726f6c6cULL + 0x9e3779b97f4a7c15ULL * seed_);
   for (BasicBody<double>& body : scene_.bodies) {
     if (body.shape.type == ShapeType::kNone || random.Chance(0.4)) continue;
@@ -417,7 +417,7 @@ std::vector<double> ConcaveOutline(const BasicShape<double>& shape, RandomNumber
 }  // namespace
 
 void SceneMaker::ConcavePolygons() {
-  if (seed_ % 4 != 3) {
+  if (seed_ % 8 != 7) {
     return;
   }
   RandomNumbers random(0x636f6e63ULL + 0x9e3779b97f4a7c15ULL * seed_);

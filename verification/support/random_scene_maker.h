@@ -72,7 +72,7 @@ class SceneMaker {
   /// Ellipses in the place of other shapes, and contact points, in every fourth scene; with random
   /// numbers of their own as well.
   void Outlines();
-  /// Concave polygons in the place of other shapes, in every fourth scene, likewise.
+  /// Concave polygons in the place of other shapes, in every eighth scene, likewise.
   void ConcavePolygons();
   /// Servos of joints and forces in every fourth scene, likewise.
   void Servos();
@@ -81,7 +81,7 @@ class SceneMaker {
   void Ends();
   /// Friction of bodies on the plane of motion in every fourth scene of fixed steps, likewise.
   void Supports();
-  /// Rolling friction of contacts in every fourth scene, likewise.
+  /// Rolling friction of contacts in every eighth scene, likewise.
   void RollingFriction();
   /// A servo whose coordinate starts at `at`.
   BasicServo<double> Servo(double at, RandomNumbers* random);

@@ -179,7 +179,7 @@ bool SolveUnrolled(const ContactProblem<T>& problem, const ContactSolution<doubl
     double size = 0.0;
     for (size_t i = 1; i < given.contacts.size(); ++i) {
       if (!problem.contacts[i].rolls) continue;
-      if constexpr (NumDerivatives<T>::value > 0) {
+      if constexpr (requires(const T& x) { x.v.cwiseAbs(); }) {
         const T& next = solution->normal_impulse[i - 1];
         const T difference = next - normal[i - 1];
         const auto largest = [](const T& x) {

@@ -231,7 +231,7 @@ TEST(RollingFrictionTest, MixesAndBelongsToPairs) {
 }
 
 // A wheel that a hinged arm presses onto a belt: the torque changes the load that limits it. The
-// belt drags the wheel by f = ρ N / R, and moments about the arm's hinge give
+// belt drags the wheel by f = ρ N / R, and moments about the arm's hinge give:
 //   N (L + (H − R) ρ / R) = (m L + m_arm L / 2) g,
 // with the belt's direction as the sign of ρ.
 TEST(RollingFrictionTest, TheLoadFollowsTheTorque) {
