@@ -296,3 +296,30 @@ def test_times_of_events_are_data() -> None:
     with pytest.raises(ValueError, match="number: expected 1, 2"):
         table["number"] = [1, None, 3, 4, 5]
         tangible.fit(problem)
+
+
+def test_random_forces_are_found_over_time() -> None:
+    """A mass that a force drives which the scene does not have."""
+    times = np.linspace(0.0, 3.0, 76)
+    # ẍ = 0.2 sin 3 t from rest, without a spring.
+    seen = 0.2 * (times / 3.0 - np.sin(3.0 * times) / 9.0)
+    scene = {
+        "gravity": [0, 0],
+        "bodies": [
+            {"name": "m", "mass": 2, "position": [0, 0], "shape": {"circle": {"radius": 0.1}}}],
+        "simulation": {"dt": 0.02, "duration": 3},
+    }
+    noise = [{"body": "m", "coordinate": "x", "intensity": 1.0}]
+    result = tangible.fit(
+        scene, {"time": times, "m/x": seen}, ["bodies/m/velocity/x"], sigma=1e-4, process_noise=noise
+    )
+    (force,) = result.process_noise
+    (course,) = force["forces"]
+    inside = (course["time"] > 0.3) & (course["time"] < 2.7)
+    expected = 0.4 * np.sin(3.0 * course["time"])
+    assert np.abs(course["force"] - expected)[inside].max() < 0.05
+    (states,) = result.smoothed_states
+    assert np.abs(np.interp(times, states["time"], states["states"]["m/x"]) - seen).max() < 1e-3
+    assert (course["standard_deviation"] > 0).all()
+    with pytest.raises(TypeError, match="process_noise"):
+        tangible.fit("fit.json", process_noise=noise)
