@@ -27,10 +27,11 @@ constexpr int kMostRollingRounds = 60;
 // Rounds of mode changes in the problem itself, and how many of a contact are made beside others.
 constexpr int kMostModeRounds = 20;
 constexpr int kMostChangesTogether = 3;
-// Pivots a contact, and proximal steps that follow them.
+// Pivots a contact, proximal steps that follow them, and after how many rounds they are tried again
+// over other shifts.
 constexpr int kPivotsOfWhole = 20;
-constexpr int kPivotEvery = 4;
 constexpr int kMostPivotRounds = 6;
+constexpr int kPivotEvery = 4;
 // Where two limits follow each other in turns, the mean of both is tried from this round on; every
 // so many rounds half of the change is left out once more.
 constexpr int kFirstMeanRound = 3;
@@ -50,13 +51,15 @@ void GiveLimit(const ContactBlock<double>& whole, double normal, ContactBlock<do
   }
 }
 
-// The mode of rolling friction in the whole problem.
+// The mode of rolling friction in the whole problem; `v` is null where no motion is known, as at the
+// start: then it holds.
 ContactMode WholeMode(const ContactProblem<double>& problem, size_t i, ContactMode mode,
                       ContactMode of_contact, const double* v) {
   const ContactBlock<double>& c = problem.contacts[i];
   if (of_contact == ContactMode::kOpen) return ContactMode::kOpen;
   if (!c.has_friction) return ContactMode::kClosed;
   if (mode != ContactMode::kClosed) return mode;
+  if (v == nullptr) return ContactMode::kSticking;
   return RowDot(c.a, c.tangent_a, c.b, c.tangent_b, v) + c.c_t < 0.0
              ? ContactMode::kSlidingNegative
              : ContactMode::kSlidingPositive;
@@ -92,10 +95,11 @@ bool FollowsLoads(const ContactProblem<double>& problem, const ContactProblem<do
 void ContactSolver::StartWhole(const ContactProblem<double>& problem,
                                const ContactSolution<double>& solution) {
   rolled_ = solution;
+  const bool knows_motion = solution.motion.size() == problem.load.size();
+  const double* const v = knows_motion ? solution.motion.data() : nullptr;
   for (size_t i = 1; i < problem.contacts.size(); ++i) {
     if (!problem.contacts[i].rolls) continue;
-    rolled_.modes[i] =
-        WholeMode(problem, i, solution.modes[i], solution.modes[i - 1], solution.motion.data());
+    rolled_.modes[i] = WholeMode(problem, i, solution.modes[i], solution.modes[i - 1], v);
     rolled_.normal_impulse[i] = rolled_.normal_impulse[i - 1];
   }
   whole_ = problem;

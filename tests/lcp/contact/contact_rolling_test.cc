@@ -169,5 +169,27 @@ TEST(ContactRollingTest, RandomProblemsAreSolvedAsByAllModes) {
   EXPECT_GT(loaded, 100);
 }
 
+// A guess that knows loads but no motion, and has friction where the last solution had none.
+TEST(ContactRollingTest, AGuessNeedsNoMotion) {
+  std::mt19937_64 random(7);
+  for (int trial = 0; trial < 40; ++trial) {
+    const ContactProblem<double> p = RandomProblem(&random, 0.1);
+    ContactSolution<double> solution, other;
+    solution.modes.assign(p.contacts.size(), ContactMode::kOpen);
+    solution.normal_impulse.assign(p.contacts.size(), 0.0);
+    solution.tangent_impulse.assign(p.contacts.size(), 0.0);
+    other = solution;
+    other.modes.assign(p.contacts.size(), ContactMode::kClosed);
+    other.normal_impulse.assign(p.contacts.size(), 0.1);
+    for (size_t i = 0; i < p.contacts.size(); i += 2) other.modes[i] = ContactMode::kSticking;
+    ContactSolver solver;
+    ASSERT_TRUE(solver.Solve(p, {}, &solution).solved) << trial;
+    ASSERT_TRUE(solver.Solve(p, {}, &other).solved) << trial;
+    for (size_t i = 0; i < solution.motion.size(); ++i) {
+      EXPECT_NEAR(other.motion[i], solution.motion[i], 1e-9) << trial;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace tangible
