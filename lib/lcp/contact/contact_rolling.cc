@@ -51,8 +51,8 @@ void GiveLimit(const ContactBlock<double>& whole, double normal, ContactBlock<do
   }
 }
 
-// The mode of rolling friction in the whole problem. Where no motion is known, as at the start, v is
-// null, and it holds.
+// The mode of rolling friction in the whole problem. It holds where no motion is known (v is null),
+// as at the start.
 ContactMode WholeMode(const ContactProblem<double>& problem, size_t i, ContactMode mode,
                       ContactMode of_contact, const double* v) {
   const ContactBlock<double>& c = problem.contacts[i];
