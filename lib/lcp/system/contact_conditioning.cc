@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "tangible/lcp/system/tolerances.h"
+#include "tangible/math/leased.h"
 
 namespace tangible {
 namespace {
@@ -430,14 +431,17 @@ namespace {
 
 /// Numbers in [−1, 1), always the same; they are drawn only once, because a run measures every
 /// step.
-const std::vector<double>& Draws(size_t count) {
-  thread_local std::mt19937 random(20240229);
-  thread_local std::vector<double> draws;
-  while (draws.size() < count) {
-    draws.push_back(2.0 * (static_cast<double>(random()) / 4294967296.0) - 1.0);
+struct FixedDraws {
+  std::mt19937 random{20240229};
+  std::vector<double> draws;
+
+  const std::vector<double>& AtLeast(size_t count) {
+    while (draws.size() < count) {
+      draws.push_back(2.0 * (static_cast<double>(random()) / 4294967296.0) - 1.0);
+    }
+    return draws;
   }
-  return draws;
-}
+};
 
 }  // namespace
 
@@ -452,7 +456,8 @@ SystemQuality MeasureSystem(const ContactProblem<double>& problem,
   const std::vector<double> d = Scales(problem, rows, size);
   quality.condition = NormOfSystem(problem, rows, d) * NormOfInverse(problem, modes, d, system);
   // K x of a random x is consistent, even where rows are redundant.
-  const std::vector<double>& draws = Draws(size);
+  Leased<FixedDraws> fixed;
+  const std::vector<double>& draws = fixed->AtLeast(size);
   std::vector<double> x(size), rhs(size), left(size);
   for (size_t i = 0; i < size; ++i) {
     x[i] = d[i] * draws[i];

@@ -6,6 +6,7 @@
 
 #include "tangible/lcp/system/contact_system.h"
 #include "tangible/lcp/system/tolerances.h"
+#include "tangible/math/leased.h"
 
 namespace tangible {
 namespace {
@@ -35,12 +36,18 @@ double RowResidual(double z, double zeta, double s, double sigma) {
   return std::abs(std::min(scaled_z, scaled_s));
 }
 
+struct MomentumScratch {
+  std::vector<double> left;
+  std::vector<double> terms;  // the largest of each row
+};
+
 // The residual is relative to the terms of each body itself: those of a heavy body would hide the
 // error of a light one.
 double MomentumResidual(const ContactProblem<double>& problem, const ContactScales& scales,
                         const ContactSolution<double>& solution) {
-  thread_local std::vector<double> left;
-  thread_local std::vector<double> terms;  // the largest of each row
+  Leased<MomentumScratch> scratch;
+  std::vector<double>& left = scratch->left;
+  std::vector<double>& terms = scratch->terms;
   left.assign(problem.load.begin(), problem.load.end());
   terms.resize(left.size());
   const double* v = solution.motion.data();
@@ -223,7 +230,8 @@ double ImpulseScale(const std::vector<double>& impulses) {
 double NaturalResidual(const ContactProblem<double>& problem,
                        const ContactSolution<double>& solution, int* worst_contact) {
   *worst_contact = -1;
-  thread_local ContactScales scales;
+  Leased<ContactScales> lease;
+  ContactScales& scales = *lease;
   scales.Compute(problem, solution);
   double worst = std::max(MomentumResidual(problem, scales, solution),
                           JointResidual(problem, scales, solution.motion.data()));

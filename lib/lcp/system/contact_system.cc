@@ -8,6 +8,7 @@
 #include "tangible/lcp/system/joint_damping.h"
 #include "tangible/lcp/system/tolerances.h"
 #include "tangible/lcp/system/torque_free.h"
+#include "tangible/math/leased.h"
 #include "tangible/math/scratch.h"
 
 namespace tangible {
@@ -405,11 +406,6 @@ double ContactSystem::SolveProximal(const ContactProblem<double>& problem,
   return Refine<false>(problem, modes, Regularisation::kLeftOut, free, x, columns, kResidualGoal);
 }
 
-ContactSystem::RefinementScratch& ContactSystem::Scratch() {
-  static thread_local RefinementScratch scratch;
-  return scratch;
-}
-
 // Refines x for the right-hand side rhs_ as long as a round halves the residual of some column.
 template <bool kTransposed>
 double ContactSystem::Refine(const ContactProblem<double>& problem,
@@ -417,7 +413,8 @@ double ContactSystem::Refine(const ContactProblem<double>& problem,
                              const FreeMomenta& free, double* x, int columns, double goal) {
   const size_t size = rhs_.size();
   SizeScratch(size, &correction_);
-  RefinementScratch& scratch = Scratch();
+  Leased<RefinementScratch> lease;
+  RefinementScratch& scratch = *lease;
   std::vector<ResidualSize>& sizes = scratch.sizes;
   std::vector<ResidualSize>& next_sizes = scratch.next_sizes;
   std::vector<char>& refined = scratch.refined;
@@ -471,7 +468,7 @@ double ContactSystem::Refine(const ContactProblem<double>& problem,
   ResidualSize all;
   for (int c = 0; c < columns; ++c) {
     if (masses_differ_ && sizes[c].ToParts() > kContradictory) {
-      RefineConjugate<kTransposed>(problem, modes, regularisation, free, x, columns, c);
+      RefineConjugate<kTransposed>(problem, modes, regularisation, free, x, columns, c, &scratch);
     }
     all.Include(sizes[c]);
   }

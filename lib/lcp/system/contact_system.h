@@ -136,6 +136,13 @@ class ContactSystem {
       return std::max(momentum.RelativeToParts(), constraint.RelativeToParts());
     }
   };
+  // Scratch of refinement; a call leases it, rather than each system, because a tape keeps many
+  // systems.
+  struct RefinementScratch {
+    std::vector<ResidualSize> sizes, next_sizes;  // of columns
+    std::vector<char> refined;                    // whether a column is done
+    std::vector<double> conjugate;
+  };
   template <bool kTransposed>
   class ColumnResidual;
   // Momenta of the motion without constraints, whose speeds have the size of the terms that cancel
@@ -155,11 +162,11 @@ class ContactSystem {
   double Refine(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes,
                 Regularisation regularisation, const FreeMomenta& free, double* x, int columns,
                 double goal);
-  // Refines a column further by conjugate residuals; Scratch() has its residual.
+  // Refines a column further by conjugate residuals, from its residual in `scratch`.
   template <bool kTransposed>
   void RefineConjugate(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes,
                        Regularisation regularisation, const FreeMomenta& free, double* x,
-                       int columns, int column);
+                       int columns, int column, RefinementScratch* scratch);
   bool FactorAs(bool condensed, const ContactProblem<double>& problem,
                 const std::vector<ContactMode>& modes);
   // Factorises the whole system in place of the condensed one if refinement left the residual
@@ -179,15 +186,6 @@ class ContactSystem {
   template <bool kTransposed>
   double RefinedSolve(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes,
                       double* x, int columns);
-
-  // Scratch of refinement, one for each thread rather than for each system, because a tape keeps
-  // many systems.
-  struct RefinementScratch {
-    std::vector<ResidualSize> sizes, next_sizes;  // of columns
-    std::vector<char> refined;                    // whether a column is done
-    std::vector<double> conjugate;
-  };
-  static RefinementScratch& Scratch();
 
   BlockLu<double> lu_;
   std::vector<std::pair<int, int>> edges_;

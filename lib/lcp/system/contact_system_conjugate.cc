@@ -25,18 +25,18 @@ template <bool kTransposed>
 void ContactSystem::RefineConjugate(const ContactProblem<double>& problem,
                                     const std::vector<ContactMode>& modes,
                                     Regularisation regularisation, const FreeMomenta& free,
-                                    double* x, int columns, int column) {
+                                    double* x, int columns, int column,
+                                    RefinementScratch* scratch) {
   const size_t rows = rhs_.size() / columns;
-  RefinementScratch& scratch = Scratch();
-  SizeScratch(rows * (5 + 2 * kMostDirections), &scratch.conjugate);
-  double* zero = scratch.conjugate.data();
+  SizeScratch(rows * (5 + 2 * kMostDirections), &scratch->conjugate);
+  double* zero = scratch->conjugate.data();
   double* rhs = zero + rows;
   double* at = rhs + rows;
   double* left = at + rows;
   double* weight = left + rows;
   double* corrections = weight + rows;
   double* changes = corrections + rows * kMostDirections;  // K times these, orthonormal
-  ResidualSize* size = &scratch.sizes[column];
+  ResidualSize* size = &scratch->sizes[column];
   for (size_t i = 0; i < rows; ++i) {
     const RowScale& kind =
         i < 3 * static_cast<size_t>(problem.num_bodies) ? size->momentum : size->constraint;
@@ -102,7 +102,7 @@ void ContactSystem::RefineConjugate(const ContactProblem<double>& problem,
 #define TANGIBLE_INSTANTIATE(kTransposed)                                             \
   template void ContactSystem::RefineConjugate<kTransposed>(                          \
       const ContactProblem<double>&, const std::vector<ContactMode>&, Regularisation, \
-      const FreeMomenta&, double*, int, int);
+      const FreeMomenta&, double*, int, int, RefinementScratch*);
 TANGIBLE_INSTANTIATE(false)
 TANGIBLE_INSTANTIATE(true)
 #undef TANGIBLE_INSTANTIATE
