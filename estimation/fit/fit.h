@@ -47,6 +47,9 @@ const char* NameOf(FitApproach approach);
 /// derivatives may be wrong.
 enum class ProfilePass { kWhereNeeded, kSkip };
 
+/// Whether it is asked what would explain the residuals (missing.h), by what calls the fit.
+enum class MissingPass { kRun, kSkip };
+
 struct FitOptions {
   GradientMethod derivatives = GradientMethod::kTangent;
   double huber = 0.0;  ///< b, in multiples of sigma; 0: plain squares
@@ -67,6 +70,7 @@ struct FitOptions {
   /// at its bound, which takes one more run with a column for each of them.
   HeldTest held_test = HeldTest::kRun;
   ProfilePass profile_pass = ProfilePass::kWhereNeeded;
+  MissingPass missing = MissingPass::kSkip;
   std::vector<std::string> profiles;  ///< names of parameters whose profiles are made in any case
   /// Whether each residual's leverage is computed (Uncertainty::leverages).
   Leverages leverages = Leverages::kSkip;

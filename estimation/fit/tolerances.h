@@ -141,5 +141,14 @@ inline constexpr double kLeastInformation = 1e-12;
 inline constexpr double kDesignRank = 1e-12;
 /// Of the duration of a take: an observation that is later by less is at its end.
 inline constexpr double kSameTakeTime = 1e-9;
+/// Of the length of what candidates for missing parts of a model explain: differences of the square
+/// that are smaller do not tell them apart.
+inline constexpr double kSameExplained = 1e-2;
+/// Of the variance of a residual: the same where these differences are as small as the noise, three
+/// standard deviations.
+inline constexpr double kNoiseOfOne = 9.0;
+/// Of the variance of a residual: what a column has to explain more to be worth its freedom; chance
+/// explains 1.
+inline constexpr double kWorthOfColumn = 4.0;
 
 }  // namespace tangible

@@ -39,9 +39,10 @@ bool ParseFit(const std::string& text, const std::string& file, FitFile* fit, st
 /// wrong with a parameter.
 std::unique_ptr<RecordingsProblem> MakeProblem(const FitFile& fit, std::string* error);
 
-struct Design;       // design.h
-struct MotionCheck;  // motion_check.h
-struct Posterior;    // posterior.h
+struct Design;         // design.h
+struct MissingResult;  // missing.h
+struct MotionCheck;    // motion_check.h
+struct Posterior;      // posterior.h
 
 /// What was found beside the estimates; each may be null.
 struct FitFindings {
@@ -51,6 +52,7 @@ struct FitFindings {
   const Posterior* posterior = nullptr;
   const HeldOutRuns* held_out = nullptr;
   const Design* design = nullptr;
+  const MissingResult* missing = nullptr;
 };
 
 /// How far the derivatives at an estimate are from those of the motion.

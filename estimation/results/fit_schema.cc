@@ -157,6 +157,7 @@ OrderedJson FitSchema() {
   properties["approach"] = SchemaOfWords(WordsOf(kApproaches));
   properties["segments"] = SchemaOfInteger(1, kMaxSegments);
   properties["starts"] = SchemaOfInteger(1, kMaxStarts);
+  properties["missing"] = {{"type", "boolean"}};
   properties["seed"] = SchemaOfInteger(0, std::numeric_limits<int>::max());
   OrderedJson schema = SchemaOfObject(properties, {"parameters"});
   schema["oneOf"] = OrderedJson::array(

@@ -7,6 +7,7 @@
 
 #include "tangible/estimation/fit/profile.h"
 #include "tangible/estimation/results/design_output.h"
+#include "tangible/estimation/results/missing_output.h"
 #include "tangible/estimation/results/noise_output.h"
 #include "tangible/estimation/results/posterior_output.h"
 #include "tangible/estimation/results/residual_summary.h"
@@ -521,21 +522,21 @@ std::string FitReport(const std::string& title, const RecordingsProblem& problem
   const std::vector<ParameterEntry>& entries = problem.entries();
   const ResidualSummary summary = SummarizeResiduals(problem, result.residuals);
   const PredictionScore* const score = findings.later == nullptr ? nullptr : &findings.later->score;
-  return HtmlPage(heading,
-                  "<h1>" + HtmlEscape(heading) + "</h1>\n<h2>Estimates</h2>\n" +
-                      EstimateTable(entries, result) + Warnings(result.uncertainty) +
-                      ProfilePlots(entries, result) +
-                      (findings.posterior ? PosteriorPart(entries, *findings.posterior) : "") +
-                      (findings.design ? DesignPart(entries, *findings.design) : "") +
-                      CombinationTable(result.uncertainty) + ProcessNoisePart(findings.components) +
-                      SpreadTable(findings.components) + SummaryTable(result) +
-                      RecordingTable(problem, result) + NoiseTable(findings.components) +
-                      RadiusTable(result.certificate) + CorrelationTable(entries, result) +
-                      StepTable(entries, findings.check) + PredictionPart("Prediction", score) +
-                      HeldOutPart(findings.held_out) + StartTable(result) +
-                      IterationPlots(entries, result) + ResidualTable(summary) +
-                      OutlierTable(summary) +
-                      SeriesPlots(CollectSeries(problem, result), summary.series.size()));
+  return HtmlPage(
+      heading,
+      "<h1>" + HtmlEscape(heading) + "</h1>\n<h2>Estimates</h2>\n" +
+          EstimateTable(entries, result) + Warnings(result.uncertainty) +
+          ProfilePlots(entries, result) + (findings.missing ? MissingPart(*findings.missing) : "") +
+          (findings.posterior ? PosteriorPart(entries, *findings.posterior) : "") +
+          (findings.design ? DesignPart(entries, *findings.design) : "") +
+          CombinationTable(result.uncertainty) + ProcessNoisePart(findings.components) +
+          SpreadTable(findings.components) + SummaryTable(result) +
+          RecordingTable(problem, result) + NoiseTable(findings.components) +
+          RadiusTable(result.certificate) + CorrelationTable(entries, result) +
+          StepTable(entries, findings.check) + PredictionPart("Prediction", score) +
+          HeldOutPart(findings.held_out) + StartTable(result) + IterationPlots(entries, result) +
+          ResidualTable(summary) + OutlierTable(summary) +
+          SeriesPlots(CollectSeries(problem, result), summary.series.size()));
 }
 
 }  // namespace tangible

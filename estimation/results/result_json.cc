@@ -7,6 +7,7 @@
 #include "tangible/estimation/fit/motion_check.h"
 #include "tangible/estimation/results/design_output.h"
 #include "tangible/estimation/results/fit_json.h"
+#include "tangible/estimation/results/missing_output.h"
 #include "tangible/estimation/results/noise_output.h"
 #include "tangible/estimation/results/posterior_output.h"
 #include "tangible/estimation/results/residual_summary.h"
@@ -426,6 +427,10 @@ OrderedJson ResultToJson(const RecordingsProblem& problem, const FitResult& resu
   }
   if (findings.design != nullptr) {
     json["design"] = DesignToJson(problem.entries(), *findings.design);
+  }
+  if (findings.missing != nullptr) {
+    json["missing"] = MissingToJson(*findings.missing);
+    json["missing_summary"] = MissingSummaryToJson(*findings.missing);
   }
   if (findings.components != nullptr && !findings.components->noise.empty()) {
     json["sensor_noise"] = NoiseToJson(findings.components->noise);

@@ -131,6 +131,7 @@ FitOptions ReadOptions(const JsonReader& root) {
     options.seed =
         static_cast<unsigned>(root.At("seed").Integer(0, std::numeric_limits<int>::max()));
   }
+  if (root.Has("missing") && root.At("missing").Boolean()) options.missing = MissingPass::kRun;
   return options;
 }
 
@@ -158,7 +159,7 @@ class RunReader {
   bool Read() {
     root_.ExpectKeys({"scene", "observations", "recordings", "initial", "points", "sensors",
                       "cameras", "clocks", "events", "links", "parameters", "derivatives", "loss",
-                      "approach", "segments", "starts", "seed", "process_noise"});
+                      "approach", "segments", "starts", "seed", "process_noise", "missing"});
     const std::string scene_file = JoinPath(folder_, root_.At("scene").String());
     if (!root_.ok()) {
       return true;
@@ -203,6 +204,7 @@ class RunReader {
     if (options.derivatives != GradientMethod::kTangent) refuse("derivatives", "expected tangent");
     if (options.segments > 1) refuse("segments", "expected 1");
     if (options.approach == FitApproach::kWindows) refuse("approach", "expected auto or plain");
+    if (options.missing == MissingPass::kRun) refuse("missing", "expected false");
     for (const Sensor& sensor : problem_->instruments.sensors) {
       if (sensor.estimate_sigma) refuse("sensors", "expected no estimate_sigma");
     }

@@ -1,142 +1,52 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/estimation/uncertainty/held_parameters.h"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <utility>
 
+#include "tangible/estimation/uncertainty/score_rows.h"
 #include "tangible/estimation/uncertainty/tolerances.h"
 #include "tangible/render/html.h"
 
 namespace tangible {
 namespace {
 
-/// The part of v that is orthogonal to the columns of `qr`.
-template <typename Matrix>
-Matrix Project(const Eigen::ColPivHouseholderQR<Eigen::MatrixXd>& qr, const Matrix& v) {
-  if (qr.cols() == 0 || qr.rank() == 0) {
-    return v;
-  }
-  Eigen::MatrixXd rotated = qr.householderQ().adjoint() * v;
-  rotated.topRows(qr.rank()).setZero();
-  return qr.householderQ() * rotated;
-}
-
-Eigen::ColPivHouseholderQR<Eigen::MatrixXd> Decompose(const Eigen::MatrixXd& columns) {
-  Eigen::MatrixXd unit = columns;
-  for (Eigen::Index k = 0; k < unit.cols(); ++k) {
-    const double length = unit.col(k).norm();
-    unit.col(k) /= length > 0.0 ? length : 1.0;
-  }
-  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr;
-  if (unit.size() > 0) {
-    qr.compute(unit);
-  }
-  return qr;
-}
-
-/// The rows of all blocks, from which the free own parameters are eliminated.
-struct Rows {
-  Eigen::VectorXd residuals;
-  RowMatrixXd free;   // shared parameters that are not at a bound
-  RowMatrixXd bound;  // all parameters that are
-  RowMatrixXd held;
+/// The numbers that are held, and their columns without what free own parameters can do.
+struct HeldRows {
+  RowMatrixXd columns;
   std::vector<ParameterEntry> candidates;
 };
 
-/// Gathers the rows of a problem at its estimate.
-class Gatherer {
- public:
-  Gatherer(const Eigen::VectorXd& estimate, const HeldOptions& options,
-           LeastSquaresProblem* problem)
-      : estimate_(estimate), options_(options), problem_(problem), layout_(*problem) {
-    const std::vector<ParameterEntry>& entries = problem->entries();
-    for (int k = 0; k < layout_.num_parameters(); ++k) {
-      if (IsAtBound(entries[k], estimate[k])) {
-        bound_.push_back(k);
-      } else if (k < layout_.num_shared()) {
-        free_.push_back(k);
+/// False where there is no number or a run fails.
+bool GatherHeld(const Eigen::VectorXd& estimate, const HeldOptions& options,
+                LeastSquaresProblem* problem, ScoreRows* score, HeldRows* rows) {
+  const BlockLayout& layout = score->layout();
+  std::map<std::string, int> index;
+  // The candidates come first, because they determine the number of columns.
+  std::vector<HeldColumns> held(static_cast<size_t>(layout.num_blocks()));
+  for (int block = 0; block < layout.num_blocks(); ++block) {
+    held[block] = problem->EvaluateHeld(block, layout.Local(block, estimate), options.derivatives,
+                                        options.most_candidates);
+    for (const ParameterEntry& entry : held[block].entries) {
+      if (index.emplace(entry.name, static_cast<int>(index.size())).second) {
+        rows->candidates.push_back(entry);
       }
     }
   }
-  const std::vector<int>& bound() const { return bound_; }
-
-  bool Gather(Rows* rows) {
-    const Eigen::Index count = layout_.num_rows();
-    rows->residuals = Eigen::VectorXd::Zero(count);
-    rows->free = RowMatrixXd::Zero(count, static_cast<Eigen::Index>(free_.size()));
-    rows->bound = RowMatrixXd::Zero(count, static_cast<Eigen::Index>(bound_.size()));
-    // The candidates come first, because they determine the number of columns.
-    std::vector<HeldColumns> held(layout_.num_blocks());
-    for (int block = 0; block < layout_.num_blocks(); ++block) {
-      held[block] = problem_->EvaluateHeld(block, layout_.Local(block, estimate_),
-                                           options_.derivatives, options_.most_candidates);
-      for (const ParameterEntry& entry : held[block].entries) {
-        if (index_.emplace(entry.name, static_cast<int>(index_.size())).second) {
-          rows->candidates.push_back(entry);
-        }
-      }
-    }
-    rows->held = RowMatrixXd::Zero(count, static_cast<Eigen::Index>(rows->candidates.size()));
-    bool done = !rows->candidates.empty();
-    for (int block = 0; block < layout_.num_blocks() && done; ++block) {
-      done = AddBlock(block, held[block], rows);
-    }
-    return done;
-  }
-
- private:
-  bool AddBlock(int block, const HeldColumns& held, Rows* rows) {
-    BlockEvaluation evaluation;
-    if (!problem_->EvaluateBlock(block, layout_.Local(block, estimate_), options_.derivatives,
-                                 BlockDerivatives::kCompute, &evaluation)) {
-      return false;
-    }
-    const double root = std::sqrt(problem_->weight(block));
-    std::vector<int> own;  // free ones
-    for (int i = layout_.num_shared(); i < layout_.num_local(block); ++i) {
-      const int k = layout_.ParameterOf(block, i);
-      if (!IsAtBound(problem_->entries()[k], estimate_[k])) {
-        own.push_back(i);
-      }
-    }
-    const auto qr = Decompose(root * evaluation.jacobian(Eigen::all, own));
-    const Eigen::Index first = layout_.row_offset(block);
-    const Eigen::Index count = evaluation.residuals.size();
-    rows->residuals.segment(first, count) =
-        Project<Eigen::MatrixXd>(qr, root * evaluation.residuals);
-    rows->free.middleRows(first, count) =
-        Project<Eigen::MatrixXd>(qr, root * evaluation.jacobian(Eigen::all, free_));
-    for (size_t i = 0; i < bound_.size(); ++i) {
-      for (int local = 0; local < layout_.num_local(block); ++local) {
-        if (layout_.ParameterOf(block, local) == bound_[i]) {
-          rows->bound.col(static_cast<Eigen::Index>(i)).segment(first, count) =
-              root * evaluation.jacobian.col(local);
-        }
-      }
-    }
-    if (held.entries.empty()) {
-      return true;
-    }
-    RowMatrixXd columns = RowMatrixXd::Zero(count, held.columns.cols());
-    columns.topRows(held.columns.rows()) = root * held.columns;
-    const RowMatrixXd left = Project<Eigen::MatrixXd>(qr, columns);
+  if (rows->candidates.empty() || !score->Evaluate()) return false;
+  rows->columns =
+      RowMatrixXd::Zero(layout.num_rows(), static_cast<Eigen::Index>(rows->candidates.size()));
+  for (int block = 0; block < layout.num_blocks(); ++block) {
+    if (held[block].entries.empty()) continue;
+    const RowMatrixXd left = score->WithoutOwn(block, held[block].columns);
     for (Eigen::Index k = 0; k < left.cols(); ++k) {
-      rows->held.col(index_.at(held.entries[static_cast<size_t>(k)].name)).segment(first, count) =
-          left.col(k);
+      rows->columns.col(index.at(held[block].entries[static_cast<size_t>(k)].name))
+          .segment(layout.row_offset(block), left.rows()) = left.col(k);
     }
-    return true;
   }
-
-  const Eigen::VectorXd& estimate_;
-  const HeldOptions& options_;
-  LeastSquaresProblem* problem_;
-  BlockLayout layout_;
-  std::vector<int> free_, bound_;
-  std::map<std::string, int> index_;
-};
+  return true;
+}
 
 /// Returns false where the value cannot be distinguished from the free parameters, or may not
 /// change in that direction.
@@ -179,24 +89,23 @@ std::vector<HeldParameter> FindHeldParameters(const Eigen::VectorXd& estimate,
                                               const HeldOptions& options,
                                               LeastSquaresProblem* problem) {
   std::vector<HeldParameter> found;
-  Gatherer gatherer(estimate, options, problem);
-  Rows rows;
-  if (!gatherer.Gather(&rows)) {
+  ScoreRows score(estimate, options.derivatives, problem);
+  HeldRows rows;
+  if (!GatherHeld(estimate, options, problem, &score, &rows)) {
     return found;
   }
-  const auto qr = Decompose(rows.free);
-  const Eigen::VectorXd residuals = Project<Eigen::MatrixXd>(qr, rows.residuals);
-  const RowMatrixXd own = Project<Eigen::MatrixXd>(qr, rows.held);
+  const Eigen::VectorXd& residuals = score.residuals();
+  const RowMatrixXd own = score.WithoutShared(rows.columns);
   const double chance =
       options.least_deviations * options.least_deviations / static_cast<double>(residuals.size());
   for (size_t i = 0; i < rows.candidates.size(); ++i) {
     const Eigen::Index k = static_cast<Eigen::Index>(i);
     HeldParameter held;
-    if (!TestOne(rows.candidates[i], rows.held.col(k), own.col(k), residuals, &held) ||
+    if (!TestOne(rows.candidates[i], rows.columns.col(k), own.col(k), residuals, &held) ||
         !(held.cost_share > chance)) {
       continue;
     }
-    held.releases = Released(problem->entries(), estimate, gatherer.bound(), rows.bound,
+    held.releases = Released(problem->entries(), estimate, score.bound(), score.bound_columns(),
                              residuals + held.change * own.col(k));
     if (!held.releases.empty() || held.cost_share > options.least_share) {
       found.push_back(held);

@@ -97,7 +97,7 @@ TEST_F(FitJsonTest, BadInputsAreOneLine) {
        ": /step: unknown key, expected one of scene, observations, recordings, initial, points, "
        "sensors, cameras, clocks, events, links, parameters, derivatives, loss, approach, "
        "segments, "
-       "starts, seed, process_noise, "
+       "starts, seed, process_noise, missing, "
        "got \"step\""},
       {With("parameters", R"([{"path": "gravity/y", "step": 1}])"),
        ": /parameters/0/step: unknown key of a parameter, expected one of name, initial, lower, "
