@@ -41,6 +41,7 @@ double LargestSquaredGyration(const BasicShape<double>& shape) {
     case ShapeType::kNone:
     case ShapeType::kHalfPlane:
     case ShapeType::kPolyline:
+    case ShapeType::kSpline:
       return std::numeric_limits<double>::infinity();
     case ShapeType::kCircle:
     case ShapeType::kEllipse:

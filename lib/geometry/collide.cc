@@ -46,6 +46,9 @@ int FindContactFeatures(const ShapeView<double>& shape_a, const Pose<double>& po
   if (shape_a.type == ShapeType::kCircle && shape_b.type == ShapeType::kCircle) {
     return CollideCircles(shape_a, pose_a, shape_b, pose_b, max_gap, features);
   }
+  if (shape_a.type == ShapeType::kSpline || shape_b.type == ShapeType::kSpline) {
+    return 0;
+  }
   if (shape_a.type == ShapeType::kEllipse || shape_b.type == ShapeType::kEllipse) {
     return internal::CollideEllipse(shape_a, pose_a, shape_b, pose_b, max_gap, features);
   }

@@ -14,7 +14,7 @@
 //   vertex-edge    n = outward normal of b's edge,  gap = n·(p_a − q_b) − r_a − r_b
 //   edge-vertex    the mirror image; vertex-plane and plane-vertex likewise
 // An edge i runs from vertex i to vertex i + 1. A capsule has two edges: 0 (its normal is −y in the
-// body frame) and 1 (+y).
+// body frame) and 1 (+y). The edges of a spline are the places along it (spline_inl.h).
 
 #include "tangible/geometry/shape.h"
 
@@ -35,8 +35,24 @@ struct ContactFeature {
   int b = 0;  ///< vertex or edge of the second shape
   /// The index of the shape in its body, where a body has several; the caller numbers them.
   int part_a = 0, part_b = 0;
-  friend bool operator==(const ContactFeature&, const ContactFeature&) = default;
+  /// The number of places of a spline, whose edge is one of them; 0: no spline's edge. A contact
+  /// moves along them (FeatureAt), and is the same as one at the next place.
+  int places = 0;
+  /// a and b, or 0 for the place of a contact along a spline.
+  int FixedA() const { return places > 0 && kind == FeatureKind::kEdgeVertex ? 0 : a; }
+  int FixedB() const { return places > 0 && kind == FeatureKind::kVertexEdge ? 0 : b; }
+  friend bool operator==(const ContactFeature& x, const ContactFeature& y) {
+    if (x.kind != y.kind || x.part_a != y.part_a || x.part_b != y.part_b || x.places != y.places ||
+        x.FixedA() != y.FixedA() || x.FixedB() != y.FixedB()) {
+      return false;
+    }
+    const int apart = x.kind == FeatureKind::kEdgeVertex ? x.a - y.a : x.b - y.b;
+    return x.places == 0 || (apart + x.places + 1) % x.places <= 2;
+  }
 };
+
+/// The most numbers of a shape that a feature reads.
+inline constexpr int kMostFeatureNumbers = 8;
 
 template <typename T>
 struct ContactGeometry {
@@ -48,7 +64,7 @@ struct ContactGeometry {
 /// Writes the features of up to two contacts of the pair whose gap is below max_gap, smallest gap
 /// first, and returns their number. Faces that are (nearly) parallel have two contacts, at the two
 /// ends of their overlap, each a vertex of one shape against the face of the other. Two half-planes
-/// have none.
+/// have none, and splines have functions of their own (curve.h).
 int FindContactFeatures(const ShapeView<double>& shape_a, const Pose<double>& pose_a,
                         const ShapeView<double>& shape_b, const Pose<double>& pose_b,
                         double max_gap, ContactFeature features[2]);
@@ -60,8 +76,15 @@ ContactGeometry<T> EvaluateContact(const ContactFeature& feature, const ShapeVie
                                    const Pose<T>& pose_a, const ShapeView<T>& shape_b,
                                    const Pose<T>& pose_b);
 
-/// Indices of the parameters of a shape that EvaluateContact reads, at most 4. `is_edge`: the
-/// feature on this shape is an edge.
-int FeatureNumbers(ShapeType type, int num_numbers, bool is_edge, int feature, int numbers[4]);
+/// The feature of the same contact at these poses: along a spline it is at another place, from
+/// which EvaluateContact finds the nearest point. Other features stay as they are.
+template <typename T>
+ContactFeature FeatureAt(const ContactFeature& feature, const ShapeView<T>& shape_a,
+                         const Pose<T>& pose_a, const ShapeView<T>& shape_b, const Pose<T>& pose_b);
+
+/// Indices of the parameters of a shape that EvaluateContact reads. `is_edge`: the feature on this
+/// shape is an edge.
+int FeatureNumbers(ShapeType type, int num_numbers, bool is_edge, int feature,
+                   int numbers[kMostFeatureNumbers]);
 
 }  // namespace tangible

@@ -7,7 +7,7 @@ namespace {
 
 /// The parameters that an edge reads. Boxes and capsules have constant normals, and the edge of a
 /// capsule's core lies on its axis.
-int EdgeNumbers(ShapeType type, int num_numbers, int edge, int numbers[4]) {
+int EdgeNumbers(ShapeType type, int num_numbers, int edge, int* numbers) {
   switch (type) {
     case ShapeType::kBox:
       numbers[0] = edge % 2 == 0 ? 1 : 0;
@@ -24,6 +24,14 @@ int EdgeNumbers(ShapeType type, int num_numbers, int edge, int numbers[4]) {
       numbers[3] = 2 * end + 1;
       return 4;
     }
+    case ShapeType::kSpline: {
+      const int piece = edge / internal::kPlacesOfPiece;
+      for (int i = 0; i < 4; ++i) {
+        numbers[i] = 2 * piece + i;
+        numbers[4 + i] = num_numbers / 2 + 2 * piece + i;
+      }
+      return 8;
+    }
     default:
       return 0;
   }
@@ -31,7 +39,8 @@ int EdgeNumbers(ShapeType type, int num_numbers, int edge, int numbers[4]) {
 
 }  // namespace
 
-int FeatureNumbers(ShapeType type, int num_numbers, bool is_edge, int feature, int numbers[4]) {
+int FeatureNumbers(ShapeType type, int num_numbers, bool is_edge, int feature,
+                   int numbers[kMostFeatureNumbers]) {
   if (type == ShapeType::kHalfPlane) {
     for (int i = 0; i < 3; ++i) {
       numbers[i] = i;
@@ -44,13 +53,40 @@ int FeatureNumbers(ShapeType type, int num_numbers, bool is_edge, int feature, i
   if (type == ShapeType::kNone) {
     return 0;
   }
-  numbers[0] = type == ShapeType::kPolygon || type == ShapeType::kPolyline ? 2 * feature : 0;
+  const bool has_points =
+      type == ShapeType::kPolygon || type == ShapeType::kPolyline || type == ShapeType::kSpline;
+  numbers[0] = has_points ? 2 * feature : 0;
   if (type == ShapeType::kCircle) {
     return 1;
   }
   numbers[1] = numbers[0] + 1;
   return 2;
 }
+
+template <typename T>
+ContactFeature FeatureAt(const ContactFeature& feature, const ShapeView<T>& shape_a,
+                         const Pose<T>& pose_a, const ShapeView<T>& shape_b,
+                         const Pose<T>& pose_b) {
+  if (feature.places == 0) return feature;
+  ContactFeature moved = feature;
+  if (feature.kind == FeatureKind::kVertexEdge) {
+    moved.b = internal::PlaceAt(shape_b, feature.b,
+                                internal::FootOver(shape_a, pose_a, feature.a, pose_b));
+  } else {
+    moved.a = internal::PlaceAt(shape_a, feature.a,
+                                internal::FootOver(shape_b, pose_b, feature.b, pose_a));
+  }
+  return moved;
+}
+
+#define TANGIBLE_INSTANTIATE_FEATURE(T)                                                         \
+  template ContactFeature FeatureAt(const ContactFeature&, const ShapeView<T>&, const Pose<T>&, \
+                                    const ShapeView<T>&, const Pose<T>&);
+#define TANGIBLE_INSTANTIATE_FEATURE_JET(N) TANGIBLE_INSTANTIATE_FEATURE(Jet<N>)
+TANGIBLE_INSTANTIATE_FEATURE(double)
+TANGIBLE_FOR_EACH_JET_WIDTH_AND_LOCAL(TANGIBLE_INSTANTIATE_FEATURE_JET)
+#undef TANGIBLE_INSTANTIATE_FEATURE_JET
+#undef TANGIBLE_INSTANTIATE_FEATURE
 
 #define TANGIBLE_INSTANTIATE(T)                                                           \
   template ContactGeometry<T> EvaluateContact(const ContactFeature&, const ShapeView<T>&, \

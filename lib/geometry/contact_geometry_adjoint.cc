@@ -55,6 +55,7 @@ void VertexAdjoint(const ShapeView<double>& shape, int vertex, const Vector& bar
       break;
     case ShapeType::kPolygon:
     case ShapeType::kPolyline:
+    case ShapeType::kSpline:
       side->numbers[0] += bar.x();
       side->numbers[1] += bar.y();
       break;
@@ -163,7 +164,7 @@ void VertexAgainstVertexAdjoint(const ContactFeature& feature, const ShapeView<d
 ShapeView<LocalJet> LocalShape(const ShapeView<double>& shape, bool is_edge, int feature,
                                std::vector<LocalJet>* numbers, int* next) {
   numbers->resize(shape.num_numbers);
-  int used[4];
+  int used[kMostFeatureNumbers];
   const int count = FeatureNumbers(shape.type, shape.num_numbers, is_edge, feature, used);
   for (int i = 0; i < count; ++i) {
     (*numbers)[used[i]] = LocalJet(shape.numbers[used[i]], (*next)++);
@@ -184,8 +185,8 @@ Pose<LocalJet> LocalPose(const Pose<double>& pose, int* next) {
   return local;
 }
 
-// The adjoint for an ellipse, by Jets: its nearest points are roots of an equation, which the
-// template differentiates.
+// The adjoint for an ellipse or a spline, by Jets: their nearest points are roots of an equation,
+// which the template differentiates.
 void AdjointByJets(const ContactFeature& feature, const ShapeView<double>& shape_a,
                    const Pose<double>& pose_a, const ShapeView<double>& shape_b,
                    const Pose<double>& pose_b, const ContactGeometry<double>& bar,
@@ -216,12 +217,35 @@ void AdjointByJets(const ContactFeature& feature, const ShapeView<double>& shape
   }
 }
 
+// The same of a spline as of the spline that is one of its pieces alone: the numbers that the
+// feature reads, in their order.
+void AdjointOnPiece(ContactFeature feature, ShapeView<double> shape_a, const Pose<double>& pose_a,
+                    ShapeView<double> shape_b, const Pose<double>& pose_b,
+                    const ContactGeometry<double>& bar, ContactSideAdjoint* a_bar,
+                    ContactSideAdjoint* b_bar) {
+  const bool is_first = feature.kind == FeatureKind::kEdgeVertex;
+  ShapeView<double>& spline = is_first ? shape_a : shape_b;
+  int& place = is_first ? feature.a : feature.b;
+  int used[kMostFeatureNumbers];
+  double numbers[kMostFeatureNumbers];
+  const int count = FeatureNumbers(spline.type, spline.num_numbers, true, place, used);
+  for (int i = 0; i < count; ++i) numbers[i] = spline.numbers[used[i]];
+  spline.numbers = numbers;
+  spline.num_numbers = count;
+  place %= internal::kPlacesOfPiece;
+  AdjointByJets(feature, shape_a, pose_a, shape_b, pose_b, bar, a_bar, b_bar);
+}
+
 }  // namespace
 
 void EvaluateContactAdjoint(const ContactFeature& feature, const ShapeView<double>& shape_a,
                             const Pose<double>& pose_a, const ShapeView<double>& shape_b,
                             const Pose<double>& pose_b, const ContactGeometry<double>& bar,
                             ContactSideAdjoint* a_bar, ContactSideAdjoint* b_bar) {
+  if (feature.places > 0) {
+    AdjointOnPiece(feature, shape_a, pose_a, shape_b, pose_b, bar, a_bar, b_bar);
+    return;
+  }
   if (shape_a.type == ShapeType::kEllipse || shape_b.type == ShapeType::kEllipse) {
     AdjointByJets(feature, shape_a, pose_a, shape_b, pose_b, bar, a_bar, b_bar);
     return;

@@ -13,7 +13,7 @@ namespace tangible {
 /// contact.
 struct ContactSideAdjoint {
   double pose[3] = {0.0, 0.0, 0.0};          ///< x, y, angle
-  double numbers[4] = {0.0, 0.0, 0.0, 0.0};  ///< of FeatureNumbers, in its order
+  double numbers[kMostFeatureNumbers] = {};  ///< of FeatureNumbers, in its order
 };
 
 /// Adds to `a_bar` and `b_bar` the derivatives that follow from `bar`, those with respect to

@@ -12,6 +12,7 @@
 
 #include "tangible/geometry/collide.h"
 #include "tangible/geometry/ellipse_inl.h"
+#include "tangible/geometry/spline_inl.h"
 
 namespace tangible::internal {
 
@@ -157,6 +158,19 @@ template <typename T>
   }
 }
 
+/// The evaluation of a contact with a spline, a function of its own as that of ellipses.
+template <typename T>
+[[gnu::noinline]] ContactGeometry<T> EvaluateSpline(const ContactFeature& feature,
+                                                    const ShapeView<T>& shape_a,
+                                                    const Pose<T>& pose_a,
+                                                    const ShapeView<T>& shape_b,
+                                                    const Pose<T>& pose_b) {
+  if (feature.kind == FeatureKind::kVertexEdge) {
+    return VertexAgainstSpline(shape_a, pose_a, feature.a, shape_b, pose_b, feature.b);
+  }
+  return Swapped(VertexAgainstSpline(shape_b, pose_b, feature.b, shape_a, pose_a, feature.a));
+}
+
 }  // namespace tangible::internal
 
 namespace tangible {
@@ -166,6 +180,7 @@ ContactGeometry<T> EvaluateContact(const ContactFeature& feature, const ShapeVie
                                    const Pose<T>& pose_a, const ShapeView<T>& shape_b,
                                    const Pose<T>& pose_b) {
   using namespace internal;
+  if (feature.places > 0) return EvaluateSpline(feature, shape_a, pose_a, shape_b, pose_b);
   if (shape_a.type == ShapeType::kEllipse || shape_b.type == ShapeType::kEllipse) {
     return EvaluateEllipse(feature, shape_a, pose_a, shape_b, pose_b);
   }

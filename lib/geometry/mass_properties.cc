@@ -3,6 +3,7 @@
 #include <limits>
 
 #include "tangible/geometry/mass_properties_inl.h"
+#include "tangible/geometry/spline_inl.h"
 
 namespace tangible {
 
@@ -17,6 +18,11 @@ double BoundingRadius(const ShapeView<double>& shape) {
   double square = 0.0;
   for (int i = 0; i < num_vertices; ++i) {
     square = std::fmax(square, Vertex(shape, i).squaredNorm());
+  }
+  for (int i = 0; shape.type == ShapeType::kSpline && i + 1 < num_vertices; ++i) {
+    for (const Vector2<double>& point : ControlPointsOf(internal::PieceOf(shape, i))) {
+      square = std::fmax(square, point.squaredNorm());
+    }
   }
   return std::sqrt(square) + CoreRadius(shape);
 }

@@ -8,7 +8,9 @@
 // radius 0. The half-plane is solid where n·r ≤ d, with n = normal / |normal|, d = offset /
 // |normal|. An ellipse is a point, its centre, grown by a radius that depends on the direction
 // (ellipse.h). A polyline is no core: its edges bound a solid to the left of the way along its
-// points (outline.h); where it is closed the first point is repeated at the end.
+// points (outline.h); where it is closed the first point is repeated at the end. A spline is a
+// smooth curve through its points and bounds a solid in the same way (curve.h); the second
+// derivatives at all points follow after the points.
 
 #include "tangible/math/planar.h"
 #include "tangible/math/scalar.h"
@@ -27,7 +29,7 @@ struct ShapeView {
 };
 
 /// The number of vertices of the core: 1 of a circle or ellipse, 2 of a capsule, 4 of a box, n of a
-/// polygon or polyline; 0 of a half-plane and of no shape.
+/// polygon, polyline or spline; 0 of a half-plane and of no shape.
 inline int NumVertices(ShapeType type, int num_numbers) {
   switch (type) {
     case ShapeType::kCircle:
@@ -40,6 +42,8 @@ inline int NumVertices(ShapeType type, int num_numbers) {
     case ShapeType::kPolygon:
     case ShapeType::kPolyline:
       return num_numbers / 2;
+    case ShapeType::kSpline:
+      return num_numbers / 4;
     default:
       return 0;
   }
@@ -59,6 +63,7 @@ Vector2<T> Vertex(const ShapeView<T>& shape, int i) {
       return Vector2<T>((i == 0 ? -0.5 : 0.5) * shape.numbers[0], T(0.0));
     case ShapeType::kPolygon:
     case ShapeType::kPolyline:
+    case ShapeType::kSpline:
       return Vector2<T>(shape.numbers[2 * i], shape.numbers[2 * i + 1]);
     default:
       return Vector2<T>(T(0.0), T(0.0));

@@ -37,6 +37,9 @@ inline constexpr double kFlushTurn = 1e-9;
 /// Of the extent of a concave polygon: corners that are no farther inside of its convex hull have
 /// rows against a half-plane, so that feet of equal length are seen, and of nearly equal length.
 inline constexpr double kNearHull = 1e-6;
+/// Rad: a piece of a spline that turns by no more has at most one nearest point to any other one.
+/// Of others each quarter is looked at.
+inline constexpr double kStraightPiece = 0.1;
 /// The cosine of the angle up to which a face and an edge face each other: the farther end of their
 /// overlap is then a second contact, as that of two convex shapes.
 inline constexpr double kFacing = 0.5;

@@ -47,6 +47,8 @@ class CubicSpline {
   /// is meant, because rates jump at the ends and a time may lie on a knot: the piece's own
   /// function has the right one-sided value and derivative. Logarithmic in the knots.
   SplinePoint<T> At(const T& time, double inside) const;
+  /// m, one a knot.
+  const std::vector<T>& curvatures() const { return curvatures_; }
 
  private:
   void SolveCurvatures();

@@ -6,6 +6,16 @@
 
 namespace tangible {
 
-enum class ShapeType { kNone, kCircle, kBox, kCapsule, kPolygon, kHalfPlane, kEllipse, kPolyline };
+enum class ShapeType {
+  kNone,
+  kCircle,
+  kBox,
+  kCapsule,
+  kPolygon,
+  kHalfPlane,
+  kEllipse,
+  kPolyline,
+  kSpline
+};
 
 }  // namespace tangible

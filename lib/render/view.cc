@@ -2,9 +2,11 @@
 #include "tangible/render/view.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <map>
 
+#include "tangible/math/spline_curve.h"
 #include "tangible/render/assets.h"
 #include "tangible/render/html.h"
 
@@ -38,6 +40,8 @@ const char* Name(ShapeType type) {
       return "half_plane";
     case ShapeType::kPolyline:
       return "polyline";
+    case ShapeType::kSpline:
+      return "spline";
     default:
       return "none";
   }
@@ -109,6 +113,29 @@ void WritePose(const Vector3<double>& pose, JsonWriter* json) {
   }
 }
 
+/// The points between which a line looks like a spline's curve: each piece has one for every
+/// kTurn rad by which it turns. Of a closed curve the first one is not repeated.
+std::vector<double> DrawnCurve(const BasicShape<double>& shape) {
+  constexpr double kTurn = 0.03;
+  constexpr double kMostOfPiece = 100.0;
+  std::vector<double> points = shape.numbers;
+  if (shape.closed) points.insert(points.end(), {shape.numbers[0], shape.numbers[1]});
+  const std::vector<double> m = SplineCurvatures(points);
+  std::vector<double> drawn;
+  for (std::size_t i = 0; i + 2 < points.size(); i += 2) {
+    const SplinePiece<double> piece =
+        MakePiece(points[i], points[i + 1], points[i + 2], points[i + 3], &m[i]);
+    const int count =
+        static_cast<int>(std::ceil(std::clamp(TurnOf(piece) / kTurn, 1.0, kMostOfPiece)));
+    for (int k = 0; k < count; ++k) {
+      const Vector2<double> at = piece.At(piece.length * k / count).place;
+      drawn.insert(drawn.end(), {at.x(), at.y()});
+    }
+  }
+  if (!shape.closed) drawn.insert(drawn.end(), points.end() - 2, points.end());
+  return drawn;
+}
+
 /// Static bodies carry their pose; those that move have theirs in the frames.
 void WriteBodies(const ViewData& data, const std::vector<ViewFrame>& frames, JsonWriter* json) {
   json->Key("bodies");
@@ -124,11 +151,12 @@ void WriteBodies(const ViewData& data, const std::vector<ViewFrame>& frames, Jso
     json->Text(Name(body.shape.type));
     json->Key("numbers");
     json->Open('[');
-    for (const double number : body.shape.numbers) {
+    const bool is_spline = body.shape.type == ShapeType::kSpline;
+    for (const double number : is_spline ? DrawnCurve(body.shape) : body.shape.numbers) {
       json->Number(number);
     }
     json->Close(']');
-    if (body.shape.type == ShapeType::kPolyline) {
+    if (is_spline || body.shape.type == ShapeType::kPolyline) {
       json->Key("closed");
       json->Number(body.shape.closed ? 1.0 : 0.0);
       json->Key("solid");

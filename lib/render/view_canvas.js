@@ -53,6 +53,7 @@ function coreOf(body) {
     case "box": return {points: [[-n[0] / 2, -n[1] / 2], [n[0] / 2, -n[1] / 2], [n[0] / 2, n[1] / 2],
                                  [-n[0] / 2, n[1] / 2]], radius: 0};
     case "polygon": return {points: Array.from({length: n.length / 2}, (_, i) => [n[2 * i], n[2 * i + 1]]), radius: 0};
+    case "spline":  // points along the curve, so close to each other that it looks smooth
     case "polyline": return {points: Array.from({length: n.length / 2}, (_, i) => [n[2 * i], n[2 * i + 1]]), radius: 0};
     default: return null;
   }
@@ -64,7 +65,7 @@ function insideBody(body, pose, point) {
   const p = toBody(pose, point);
   if (body.shape === "half_plane") return body.numbers[0] * p[0] + body.numbers[1] * p[1] <= body.numbers[2];
   if (!body.core) return Math.hypot(p[0], p[1]) * camera.scale < 9;
-  if (body.shape === "polyline") return false;
+  if (body.shape === "polyline" || body.shape === "spline") return false;
   const {points, radius} = body.core;
   if (points.length > 2) {
     // A ray towards +x crosses the outline an odd number of times.
@@ -252,7 +253,7 @@ function drawPolyline(g, body, pose) {
 }
 function drawBody(g, body, pose, hovered) {
   if (body.shape === "half_plane") { drawHalfPlane(g, body, pose); return; }
-  if (body.shape === "polyline") { drawPolyline(g, body, pose); return; }
+  if (body.shape === "polyline" || body.shape === "spline") { drawPolyline(g, body, pose); return; }
   const colour = bodyColour(body), centre = toScreen([pose[0], pose[1]]);
   g.strokeStyle = colour; g.lineWidth = hovered ? 3 : 1.5;
   if (!body.core) {

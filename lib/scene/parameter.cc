@@ -170,6 +170,7 @@ double SizeOf(const BasicShape<double>& shape) {
     case ShapeType::kBox:
     case ShapeType::kPolygon:
     case ShapeType::kPolyline:
+    case ShapeType::kSpline:
       break;
   }
   double size = 0.0;

@@ -29,13 +29,14 @@ enum class SolidSide { kLeft, kRight };
 ///   kCapsule   length between the cap centres (along body x), radius
 ///   kPolygon   x0, y0, x1, y1, ...: counter-clockwise, convex or not
 ///   kPolyline  x0, y0, x1, y1, ...: as in the file
+///   kSpline    the same: the points that the curve goes through
 ///   kHalfPlane normal x, normal y, offset: solid where normal·r ≤ offset; not necessarily unit
 template <typename T>
 struct BasicShape {
   ShapeType type = ShapeType::kNone;
   std::vector<T> numbers;
-  bool closed = false;                 ///< of a polyline: the last point is joined to the first
-  SolidSide solid = SolidSide::kLeft;  ///< of a polyline, going along its points
+  bool closed = false;  ///< of a polyline or spline: the last point is joined to the first
+  SolidSide solid = SolidSide::kLeft;  ///< of the same, going along its points
 };
 
 enum class Motion { kMoving, kStatic, kKinematic };

@@ -15,7 +15,7 @@
 //   Anchors         [[x, y], [x, y]]
 //   Interval        [low, high], or absent; null: infinite
 //   Numbers         two numbers of a shape: [w, h]
-//   Vertices        numbers of a polygon or polyline: [[x, y], ...]
+//   Vertices        numbers of a polygon, polyline or spline: [[x, y], ...]
 //   NumberOrSignal  1.5 or {"file": ...}
 //   PointOrSignal   [x, y] or {"file": ...}
 //   NumberOrServo   as NumberOrSignal, or {"target": ..., "stiffness": ...}
@@ -86,7 +86,8 @@ void VisitShape(Shape& shape, Visitor* visitor) {
     case ShapeType::kPolygon:
       visitor->Vertices({"vertices", NumberKind::kFree, Dimension::kLength, true}, numbers);
       break;
-    case ShapeType::kPolyline: {
+    case ShapeType::kPolyline:
+    case ShapeType::kSpline: {
       Field points{"points", NumberKind::kFree, Dimension::kLength, true};
       points.least = 2;
       visitor->Vertices(points, numbers);
@@ -100,12 +101,18 @@ void VisitShape(Shape& shape, Visitor* visitor) {
   }
 }
 
-/// How many numbers a shape has; 0: any, as a polygon or polyline.
+/// Whether a shape is a line that bounds a solid on one side, of a body that does not move freely.
+inline bool IsTrack(ShapeType type) {
+  return type == ShapeType::kPolyline || type == ShapeType::kSpline;
+}
+
+/// How many numbers a shape has; 0: any, as a polygon, polyline or spline.
 inline int NumNumbers(ShapeType type) {
   switch (type) {
     case ShapeType::kNone:
     case ShapeType::kPolygon:
     case ShapeType::kPolyline:
+    case ShapeType::kSpline:
       return 0;
     case ShapeType::kCircle:
       return 1;

@@ -140,7 +140,7 @@ OrderedJson BodyJson(const BasicBody<double>& body) {
     OrderedJson* const item = &json["shape"][NameOf(body.shape.type, kShapeTypeNames)];
     FieldWriter shape(item);
     VisitShape(body.shape, &shape);
-    if (body.shape.type == ShapeType::kPolyline) {
+    if (IsTrack(body.shape.type)) {
       (*item)["closed"] = body.shape.closed;
       shape.Choice("solid", kSolidSideNames, body.shape.solid);
     }

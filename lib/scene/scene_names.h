@@ -19,10 +19,10 @@ inline constexpr std::pair<const char*, JointType> kJointTypeNames[] = {
     {"fixed_angle", JointType::kFixedAngle},
     {"coupling", JointType::kCoupling}};
 inline constexpr std::pair<const char*, ShapeType> kShapeTypeNames[] = {
-    {"circle", ShapeType::kCircle},    {"ellipse", ShapeType::kEllipse},
-    {"box", ShapeType::kBox},          {"capsule", ShapeType::kCapsule},
-    {"polygon", ShapeType::kPolygon},  {"half_plane", ShapeType::kHalfPlane},
-    {"polyline", ShapeType::kPolyline}};
+    {"circle", ShapeType::kCircle},     {"ellipse", ShapeType::kEllipse},
+    {"box", ShapeType::kBox},           {"capsule", ShapeType::kCapsule},
+    {"polygon", ShapeType::kPolygon},   {"half_plane", ShapeType::kHalfPlane},
+    {"polyline", ShapeType::kPolyline}, {"spline", ShapeType::kSpline}};
 inline constexpr std::pair<const char*, SolidSide> kSolidSideNames[] = {
     {"left", SolidSide::kLeft}, {"right", SolidSide::kRight}};
 inline constexpr std::pair<const char*, Signal::Interpolation> kInterpolationNames[] = {

@@ -165,7 +165,7 @@ OrderedJson ShapeSchema() {
     FieldSchema fields;
     VisitShape(shape, &fields);
     OrderedJson flags = OrderedJson::object();
-    if (type == ShapeType::kPolyline) {
+    if (IsTrack(type)) {
       flags = {{"closed", SchemaOfFlag()}, {"solid", SchemaOfWords(WordsOf(kSolidSideNames))}};
     }
     shapes[name] = fields.Item(std::move(flags), {});

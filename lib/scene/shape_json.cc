@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "tangible/math/planar.h"
+#include "tangible/math/spline_curve.h"
 #include "tangible/scene/field_reader.h"
 #include "tangible/scene/scene_fields.h"
 #include "tangible/scene/scene_names.h"
@@ -158,8 +159,53 @@ void CheckPolygon(const JsonReader& vertices, const std::vector<double>& numbers
   }
 }
 
-// The edges of a polyline do not meet but at their common points, and do not turn back there.
-void CheckPolyline(const JsonReader& place, const BasicShape<double>& shape) {
+// The curve of a spline as chords, each from the point of the same index to the next, and the piece
+// that each belongs to. A piece that turns far has several.
+struct Chords {
+  Points points;
+  std::vector<int> pieces;
+};
+
+Chords ChordsOf(const Points& points, bool closed) {
+  constexpr double kTurn = 0.1;
+  constexpr int kOfPiece = 8;
+  std::vector<double> numbers;
+  for (const Vector2<double>& point : points) {
+    numbers.insert(numbers.end(), {point.x(), point.y()});
+  }
+  if (closed) numbers.insert(numbers.end(), {points[0].x(), points[0].y()});
+  const std::vector<double> m = SplineCurvatures(numbers);
+  Chords chords;
+  for (std::size_t i = 0; 2 * i + 2 < numbers.size(); ++i) {
+    const double* const p = &numbers[2 * i];
+    const SplinePiece<double> piece = MakePiece(p[0], p[1], p[2], p[3], &m[2 * i]);
+    const int count = TurnOf(piece) > kTurn ? kOfPiece : 1;
+    for (int k = 0; k < count; ++k) {
+      chords.points.push_back(piece.At(piece.length * k / count).place);
+      chords.pieces.push_back(static_cast<int>(i));
+    }
+  }
+  if (!closed) chords.points.push_back(points.back());
+  return chords;
+}
+
+// Refuses a spline that crosses itself.
+void RefuseCrossingCurve(const JsonReader& points_at, const Points& points, bool closed) {
+  const Chords chords = ChordsOf(points, closed);
+  const auto [low, high] = CrossingEdges(chords.points, static_cast<int>(chords.pieces.size()));
+  if (low < 0) return;
+  const auto name = [&](int chord) {
+    const int piece = chords.pieces[static_cast<std::size_t>(chord)];
+    const int next = (piece + 1) % static_cast<int>(points.size());
+    return "the piece of points " + std::to_string(piece) + " and " + std::to_string(next);
+  };
+  points_at.Fail("expected a curve that does not cross or touch itself, got " + name(low) +
+                 " that meets " + name(high));
+}
+
+// The edges of a polyline, or the pieces of a spline, do not meet but at their common points, and
+// do not turn back there.
+void CheckTrack(const JsonReader& place, const BasicShape<double>& shape) {
   const JsonReader points_at = place.At("points");
   const Points points = Scaled(shape.numbers);
   const int size = static_cast<int>(points.size());
@@ -186,6 +232,7 @@ void CheckPolyline(const JsonReader& place, const BasicShape<double>& shape) {
       return points_at.At(i).Fail("expected a corner that does not turn back by 180 degrees");
     }
   }
+  if (shape.type == ShapeType::kSpline) return RefuseCrossingCurve(points_at, points, shape.closed);
   RefuseCrossing(points_at, points, num_edges);
 }
 
@@ -207,7 +254,7 @@ void ReadShape(const JsonReader& reader, BasicShape<double>* shape) {
   if (keys.size() != 1) {
     return reader.Fail(
         "expected one of circle, ellipse, box, capsule, polygon, half_plane, "
-        "polyline, got " +
+        "polyline, spline, got " +
         std::to_string(keys.size()) + " of them");
   }
   for (const auto& entry : kShapeTypeNames) {
@@ -219,13 +266,13 @@ void ReadShape(const JsonReader& reader, BasicShape<double>* shape) {
   const JsonReader item = reader.At(keys[0]);
   const char* const article = shape->type == ShapeType::kEllipse ? " of an " : " of a ";
   std::vector<std::string> expected = fields.keys();
-  const bool is_polyline = shape->type == ShapeType::kPolyline;
-  if (is_polyline) expected.insert(expected.end(), {"closed", "solid"});
+  const bool is_track = IsTrack(shape->type);
+  if (is_track) expected.insert(expected.end(), {"closed", "solid"});
   item.ExpectKeys(expected, article + keys[0]);
   if (!item.ok()) return;
   FieldReader numbers(item);
   VisitShape(*shape, &numbers);
-  if (is_polyline) {
+  if (is_track) {
     numbers.Flag("closed", shape->closed);
     numbers.Choice("solid", kSolidSideNames, shape->solid);
   }
@@ -239,7 +286,8 @@ void CheckShape(const BasicShape<double>& shape, const JsonReader& place) {
     case ShapeType::kPolygon:
       return CheckPolygon(place.At("polygon").At("vertices"), shape.numbers);
     case ShapeType::kPolyline:
-      return CheckPolyline(place.At("polyline"), shape);
+    case ShapeType::kSpline:
+      return CheckTrack(place.At(NameOf(shape.type, kShapeTypeNames)), shape);
     case ShapeType::kHalfPlane:
       if (shape.numbers[0] == 0.0 && shape.numbers[1] == 0.0) {
         place.At("half_plane").At("normal").Fail("expected a direction, got the zero vector");

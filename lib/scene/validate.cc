@@ -157,8 +157,7 @@ void CheckSupport(const BasicBody<double>& body, const JsonReader& place) {
 void CheckBody(const BasicBody<double>& body, const JsonReader& place) {
   const bool is_static = body.motion == Motion::kStatic;
   const bool moves = body.motion == Motion::kMoving;
-  if (moves &&
-      (body.shape.type == ShapeType::kHalfPlane || body.shape.type == ShapeType::kPolyline)) {
+  if (moves && (body.shape.type == ShapeType::kHalfPlane || IsTrack(body.shape.type))) {
     place.At("shape")
         .At(NameOf(body.shape.type, kShapeTypeNames))
         .Fail("expected a static or kinematic body, got a moving one");

@@ -157,10 +157,10 @@ TEST(BadSceneTest, Shapes) {
       {shape, "\"circle\"", shape + ": expected an object, got \"circle\""},
       {shape, "{}",
        shape + ": expected one of circle, ellipse, box, capsule, polygon, half_plane, polyline, "
-               "got 0 of them"},
+               "spline, got 0 of them"},
       {shape, R"({"circle": {"radius": 1}, "box": {"size": [1, 1]}})",
        shape + ": expected one of circle, ellipse, box, capsule, polygon, half_plane, polyline, "
-               "got 2 of them"},
+               "spline, got 2 of them"},
       {shape, R"({"polyline": {"points": [[0, 0]]}})",
        shape + "/polyline/points: expected an array of at least 2 points, got an array of 1"},
       {shape, R"({"polyline": {"points": [[0, 0], [1, 0], [1, 0]]}})",
@@ -179,10 +179,31 @@ TEST(BadSceneTest, Shapes) {
        shape + "/polyline/solid: expected one of left, right, got \"up\""},
       {shape, R"({"polyline": {"points": [[0, 0], [1, 0]]}})",
        shape + "/polyline: expected a static or kinematic body, got a moving one"},
+      {shape, R"({"spline": {"points": [[0, 0]]}})",
+       shape + "/spline/points: expected an array of at least 2 points, got an array of 1"},
+      {shape, R"({"spline": {"points": [[0, 0], [1, 0], [1, 0]]}})",
+       shape + "/spline/points/2: expected another point than the one before, got the same"},
+      {shape, R"({"spline": {"points": [[0, 0], [1, 0], [1, 1], [0, 0]]}})",
+       shape + "/spline/points/3: expected another point than the first, or \"closed\": true "
+               "without this one"},
+      {shape, R"({"spline": {"points": [[0, 0], [1, 0], [0.5, 0]]}})",
+       shape + "/spline/points/1: expected a corner that does not turn back by 180 degrees"},
+      {shape, R"({"spline": {"points": [[0, 0], [2, 0], [2, 1], [1, -1]]}})",
+       shape + "/spline/points: expected a curve that does not cross or touch itself, got the "
+               "piece of points 0 and 1 that meets the piece of points 2 and 3"},
+      {shape, R"({"spline": {"points": [[0, 0], [1, 0]], "closed": true}})",
+       shape + "/spline/points: expected at least 3 points, got 2"},
+      {shape, R"({"spline": {"points": [[0, 0], [1, 0]], "solid": "up"}})",
+       shape + "/spline/solid: expected one of left, right, got \"up\""},
+      {shape, R"({"spline": {"points": [[0, 0], [1, 0]], "vertices": 1}})",
+       shape + "/spline/vertices: unknown key of a spline, expected one of points, closed, solid, "
+               "got \"vertices\""},
+      {shape, R"({"spline": {"points": [[0, 0], [1, 0]]}})",
+       shape + "/spline: expected a static or kinematic body, got a moving one"},
       {shape, R"({"disc": {}})",
        shape +
            "/disc: unknown key of a shape, expected one of circle, ellipse, box, capsule, polygon, "
-           "half_plane, polyline, got \"disc\""},
+           "half_plane, polyline, spline, got \"disc\""},
       {shape, R"({"circle": {"radius": 0}})",
        shape + "/circle/radius: expected a number > 0, got 0"},
       {shape, R"({"circle": {"radius": 1, "size": 1}})",

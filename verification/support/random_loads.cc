@@ -431,4 +431,29 @@ void SceneMaker::ConcavePolygons() {
   }
 }
 
+// Its hills are as high as the floor was, so that nothing starts in it.
+void SceneMaker::SplineFloor() {
+  if (seed_ % 8 != 5) {
+    return;
+  }
+  RandomNumbers random(0x73706c69ULL + 0x9e3779b97f4a7c15ULL * seed_);
+  const auto floor = std::find_if(scene_.bodies.begin(), scene_.bodies.end(),
+                                  [](const auto& body) { return body.name == "floor"; });
+  if (floor == scene_.bodies.end() || !random.Chance(0.8)) return;
+  const double depth = random.Uniform(0.01, 0.2);
+  const double spacing = random.Uniform(0.2, 0.5);
+  const double wave = spacing * random.Uniform(5.0, 9.0);
+  floor->shape = {ShapeType::kSpline, {}};
+  floor->shape.solid = SolidSide::kRight;
+  const double phase = random.Uniform(0.0, 1.0);
+  for (double at = -1.5; at < 4.5; at += spacing * random.Uniform(0.8, 1.2)) {
+    const double height =
+        -0.5 * depth * (1.0 - std::cos(2.0 * std::numbers::pi * (at / wave + phase)));
+    const Vector2<double> point = FloorPoint(at) + Up() * height;
+    floor->shape.numbers.insert(floor->shape.numbers.end(), {point.x(), point.y()});
+  }
+  floor->position.setZero();
+  floor->angle = 0.0;
+}
+
 }  // namespace tangible::internal

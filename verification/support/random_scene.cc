@@ -80,6 +80,7 @@ Scene SceneMaker::Make() {
   Drives();
   Outlines();
   ConcavePolygons();
+  SplineFloor();
   Servos();
   Couplings();
   Ends();

@@ -74,6 +74,8 @@ class SceneMaker {
   void Outlines();
   /// Concave polygons in the place of other shapes, in every eighth scene, likewise.
   void ConcavePolygons();
+  /// A wavy spline in the place of the floor, in every eighth scene, likewise.
+  void SplineFloor();
   /// Servos of joints and forces in every fourth scene, likewise.
   void Servos();
   /// Couplings of joints and joints that end, in every fourth scene, likewise.

@@ -141,6 +141,11 @@ class ProblemBuilder {
   ShapeView<T> ShapeOfB(const ActiveContact& contact) const {
     return tangible::ShapeOfB(model_, contact);
   }
+  /// The feature at the state: along a spline it moves.
+  ContactFeature FeatureOf(const ActiveContact& contact) const {
+    return FeatureAt(contact.feature, ShapeOfA(contact), PoseOf(contact.a), ShapeOfB(contact),
+                     PoseOf(contact.b));
+  }
   bool IsReleased(int j) const { return tangible::IsReleased(state_, j); }
   JointRows<T>& RowsOf(int j) { return scratch_.joints[j]; }
   JointRates<T>& RatesOf(int j) { return scratch_.rates[kLevel == Level::kAcceleration ? j : 0]; }

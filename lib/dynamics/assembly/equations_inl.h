@@ -256,14 +256,14 @@ class Equations {
       const MovingPose<T> b = b_.Moving(contact.b);
       const ShapeView<T> shape_a = b_.ShapeOfA(contact);
       const ShapeView<T> shape_b = b_.ShapeOfB(contact);
-      EvaluateContactRates(contact.feature, shape_a, a, shape_b, b, b_.RateScratch(), &rows,
+      EvaluateContactRates(b_.FeatureOf(contact), shape_a, a, shape_b, b, b_.RateScratch(), &rows,
                            &rates);
     } else {
       const auto& pose_a = b_.PoseOf(contact.a);
       const auto& pose_b = b_.PoseOf(contact.b);
       const ShapeView<T> shape_a = b_.ShapeOfA(contact);
       const ShapeView<T> shape_b = b_.ShapeOfB(contact);
-      rows.geometry = EvaluateContact(contact.feature, shape_a, pose_a, shape_b, pose_b);
+      rows.geometry = EvaluateContact(b_.FeatureOf(contact), shape_a, pose_a, shape_b, pose_b);
       RowsFromGeometry(shape_a.type, pose_a.position, shape_b.type, pose_b.position, &rows);
     }
     FinishContact(i, contact, &rows, &rates);

@@ -4,12 +4,49 @@
 #include <cmath>
 
 namespace tangible {
+namespace {
+
+// The vertices of a part of a body that may touch a spline: all of a convex shape, of a concave
+// polygon the corner at which a run starts.
+PlacedVertices VerticesOf(const Model<double>& model, int body, int part,
+                          const ShapeView<double>& shape, const Pose<double>& pose) {
+  const Outline* const outline = model.OutlineOf(body, part);
+  if (outline == nullptr) return {shape, pose, 0, NumVertices(shape.type, shape.num_numbers)};
+  const OutlineRun& run = outline->run(model.structure->bodies[body].RunOfPart(part));
+  return {shape, pose, run.first, run.before == OutlineJoint::kConvex ? 1 : 0};
+}
+
+}  // namespace
+
+int FindFeaturesAtCurve(const Model<double>& model, const PairAtCurve& pair, double max_gap,
+                        ContactFeature features[2]) {
+  const ShapeView<double> shape = model.Shape(pair.other, pair.part);
+  return FindCurveFeatures({*pair.curve, pair.curve_pose},
+                           VerticesOf(model, pair.other, pair.part, shape, pair.other_pose),
+                           pair.side, max_gap, features);
+}
+
+double DistanceAtCurve(const Model<double>& model, const PairAtCurve& pair,
+                       ContactFeature* nearest) {
+  const ShapeView<double> shape = model.Shape(pair.other, pair.part);
+  return DistanceOfCurve({*pair.curve, pair.curve_pose},
+                         VerticesOf(model, pair.other, pair.part, shape, pair.other_pose),
+                         pair.side, nearest);
+}
 
 int FindFeaturesAtSeams(const Model<double>& model, int a, const Pose<double>& pose_a, int b,
                         const Pose<double>& pose_b, PartPair parts, double max_gap,
                         ContactFeature features[2]) {
   const ShapeView<double> shape_a = model.Shape(a, parts.a);
   const ShapeView<double> shape_b = model.Shape(b, parts.b);
+  if (const Curve* curve = model.CurveOf(a, parts.a); curve != nullptr) {
+    return FindFeaturesAtCurve(model, {curve, pose_a, b, parts.b, pose_b, SeamSide::kFirst},
+                               max_gap, features);
+  }
+  if (const Curve* curve = model.CurveOf(b, parts.b); curve != nullptr) {
+    return FindFeaturesAtCurve(model, {curve, pose_b, a, parts.a, pose_a, SeamSide::kSecond},
+                               max_gap, features);
+  }
   const Outline* const outline_a = model.OutlineOf(a, parts.a);
   const Outline* const outline_b = model.OutlineOf(b, parts.b);
   if (outline_a != nullptr || outline_b != nullptr) {

@@ -79,7 +79,21 @@ struct ActiveContact {
   }
 };
 
-/// FindFeatures where one of the shapes has seams or an outline.
+/// A spline and a part of another body. `side`: which one of the pair the spline is.
+struct PairAtCurve {
+  const Curve* curve = nullptr;
+  const Pose<double>& curve_pose;
+  int other = -1, part = 0;
+  const Pose<double>& other_pose;
+  SeamSide side = SeamSide::kFirst;
+};
+/// FindCurveFeatures and DistanceOfCurve of such a pair.
+int FindFeaturesAtCurve(const Model<double>& model, const PairAtCurve& pair, double max_gap,
+                        ContactFeature features[2]);
+double DistanceAtCurve(const Model<double>& model, const PairAtCurve& pair,
+                       ContactFeature* nearest);
+
+/// FindFeatures where one of the shapes has seams, an outline or a curve.
 int FindFeaturesAtSeams(const Model<double>& model, int a, const Pose<double>& pose_a, int b,
                         const Pose<double>& pose_b, PartPair parts, double max_gap,
                         ContactFeature features[2]);
@@ -303,7 +317,8 @@ void EvaluateContactRows(const Model<T>& model, const Pose<T>& pose_a, const Pos
                          const ActiveContact& contact, ContactRows<T>* rows) {
   const ShapeView<T> shape_a = ShapeOfA(model, contact);
   const ShapeView<T> shape_b = ShapeOfB(model, contact);
-  rows->geometry = EvaluateContact(contact.feature, shape_a, pose_a, shape_b, pose_b);
+  rows->geometry = EvaluateContact(FeatureAt(contact.feature, shape_a, pose_a, shape_b, pose_b),
+                                   shape_a, pose_a, shape_b, pose_b);
   RowsFromGeometry(shape_a.type, pose_a.position, shape_b.type, pose_b.position, rows);
 }
 

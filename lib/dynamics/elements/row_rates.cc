@@ -35,7 +35,7 @@ ShapeView<Dual<T>> DualShape(const ShapeView<T>& shape, bool is_edge, int featur
   if (static_cast<int>(numbers->size()) < shape.num_numbers) {
     numbers->resize(shape.num_numbers);
   }
-  int used[4];
+  int used[kMostFeatureNumbers];
   const int count = FeatureNumbers(shape.type, shape.num_numbers, is_edge, feature, used);
   for (int i = 0; i < count; ++i) {
     (*numbers)[used[i]] = Dual<T>(shape.numbers[used[i]], T(0.0));

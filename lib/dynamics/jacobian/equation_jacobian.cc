@@ -106,11 +106,12 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
              LocalJet(before_[3 * body + 2])}};
   }
   ShapeView<LocalJet> ShapeOfA(const ActiveContact& contact) {
-    return LocalShapeOfA(contact, &locals_);
+    return LocalShapeOfA(contact, this->FeatureNow(contact), &locals_);
   }
   ShapeView<LocalJet> ShapeOfB(const ActiveContact& contact) {
-    return LocalShapeOfB(contact, &locals_);
+    return LocalShapeOfB(contact, this->FeatureNow(contact), &locals_);
   }
+  ContactFeature FeatureOf(const ActiveContact& contact) const { return this->FeatureNow(contact); }
   bool IsReleased(int j) const { return tangible::IsReleased(state_, j); }
   JointRows<LocalJet>& RowsOf(int) { return joint_rows_; }
   JointRates<LocalJet>& RatesOf(int) { return joint_rates_; }
@@ -599,8 +600,9 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
     const Pose<double> pose_b = state_.PoseOf(contact.b);
     const ShapeView<double> shape_a = tangible::ShapeOfA(model_, contact);
     const ShapeView<double> shape_b = tangible::ShapeOfB(model_, contact);
+    const ContactFeature feature = FeatureAt(contact.feature, shape_a, pose_a, shape_b, pose_b);
     ContactRows<double> rows;
-    rows.geometry = EvaluateContact(contact.feature, shape_a, pose_a, shape_b, pose_b);
+    rows.geometry = EvaluateContact(feature, shape_a, pose_a, shape_b, pose_b);
     RowsFromGeometry(shape_a.type, pose_a.position, shape_b.type, pose_b.position, &rows);
     const double* u_contact = sink_.u + 3 * static_cast<size_t>((*solved_.contact_block)[i]);
     const double u_n = IsDriven(i) ? 0.0 : u_contact[0];
@@ -622,21 +624,19 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
     bar.gap = contact.law == ContactLaw::kGap ? u_n / at_.h : 0.0;
     ContactSideAdjoint a_bar;
     ContactSideAdjoint b_bar;
-    ContactRowsAdjoint(contact.feature, shape_a, pose_a, shape_b, pose_b, rows, bar, &a_bar,
-                       &b_bar);
-    const auto add = [&](int body, int part, bool is_edge, int feature,
+    ContactRowsAdjoint(feature, shape_a, pose_a, shape_b, pose_b, rows, bar, &a_bar, &b_bar);
+    const auto add = [&](int body, int part, bool is_edge, int of_feature,
                          const ContactSideAdjoint& side) {
       for (int k = 0; k < 3; ++k) {
         sink_.w_bar[s_.PoseVariable(body, k)] -= side.pose[k];
       }
       const PartIndex index = s_.bodies[body].Part(part);
-      int used[4];
-      const int count = FeatureNumbers(index.type, index.num_numbers, is_edge, feature, used);
+      int used[kMostFeatureNumbers];
+      const int count = FeatureNumbers(index.type, index.num_numbers, is_edge, of_feature, used);
       for (int k = 0; k < count; ++k) {
         sink_.w_bar[s_.ParameterVariable(index.numbers + used[k])] -= side.numbers[k];
       }
     };
-    const ContactFeature& feature = contact.feature;
     add(contact.a, feature.part_a, feature.kind == FeatureKind::kEdgeVertex, feature.a, a_bar);
     add(contact.b, feature.part_b, feature.kind == FeatureKind::kVertexEdge, feature.b, b_bar);
     EmitByRows(i, contact, rows);

@@ -205,48 +205,56 @@ class LocalEntries {
     }
     const MovingPose<LocalJet> a = ByTwist(contact.a, twists);
     const MovingPose<LocalJet> b = ByTwist(contact.b, twists);
-    Locals numbers;  // not read: rates by shapes' numbers are emitted with the poses
-    const ShapeView<LocalJet> shape_a = LocalShapeOfA(contact, &numbers);
-    const ShapeView<LocalJet> shape_b = LocalShapeOfB(contact, &numbers);
-    for (std::vector<LocalJet>* values : {&scratch_.numbers_a, &scratch_.numbers_b}) {
-      for (LocalJet& x : *values) {
-        x.v.setZero();
-      }
-    }
+    // Rates by shapes' numbers are emitted with the poses.
+    const ContactFeature feature = FeatureNow(contact);
+    const ShapeView<LocalJet> shape_a = LocalShapeOfA(contact, feature, nullptr);
+    const ShapeView<LocalJet> shape_b = LocalShapeOfB(contact, feature, nullptr);
     ContactRows<LocalJet> rows;
-    EvaluateContactRates(contact.feature, shape_a, a, shape_b, b, &scratch_.rates, &rows, rates);
+    EvaluateContactRates(feature, shape_a, a, shape_b, b, &scratch_.rates, &rows, rates);
   }
 
-  /// The shape parameters that the feature reads, as LocalJets in their places.
+  /// The feature at the state.
+  ContactFeature FeatureNow(const ActiveContact& contact) const {
+    if (contact.feature.places == 0) return contact.feature;
+    return FeatureAt(contact.feature, ShapeOfA(model_, contact), state_.PoseOf(contact.a),
+                     ShapeOfB(model_, contact), state_.PoseOf(contact.b));
+  }
+
+  /// The shape parameters that the feature reads, as LocalJets in their places; as constants
+  /// without `locals`.
   ShapeView<LocalJet> LocalShape(const PartIndex& index, bool is_edge, int feature, Locals* locals,
                                  std::vector<LocalJet>* numbers) {
     if (static_cast<int>(numbers->size()) < index.num_numbers) {
       numbers->resize(index.num_numbers);
     }
-    int used[4];
+    int used[kMostFeatureNumbers];
     const int count = FeatureNumbers(index.type, index.num_numbers, is_edge, feature, used);
     for (int i = 0; i < count; ++i) {
-      (*numbers)[used[i]] = LocalNumber(index.numbers + used[i], locals);
+      const int number = index.numbers + used[i];
+      (*numbers)[used[i]] = locals == nullptr ? LocalJet(x_[number]) : LocalNumber(number, locals);
     }
     return {index.type, numbers->data(), index.num_numbers};
   }
-  ShapeView<LocalJet> LocalShapeOfA(const ActiveContact& contact, Locals* locals) {
-    return LocalShape(s_.bodies[contact.a].Part(contact.feature.part_a),
-                      contact.feature.kind == FeatureKind::kEdgeVertex, contact.feature.a, locals,
+  ShapeView<LocalJet> LocalShapeOfA(const ActiveContact& contact, const ContactFeature& feature,
+                                    Locals* locals) {
+    return LocalShape(s_.bodies[contact.a].Part(feature.part_a),
+                      feature.kind == FeatureKind::kEdgeVertex, feature.a, locals,
                       &scratch_.numbers_a);
   }
-  ShapeView<LocalJet> LocalShapeOfB(const ActiveContact& contact, Locals* locals) {
-    return LocalShape(s_.bodies[contact.b].Part(contact.feature.part_b),
-                      contact.feature.kind == FeatureKind::kVertexEdge, contact.feature.b, locals,
+  ShapeView<LocalJet> LocalShapeOfB(const ActiveContact& contact, const ContactFeature& feature,
+                                    Locals* locals) {
+    return LocalShape(s_.bodies[contact.b].Part(feature.part_b),
+                      feature.kind == FeatureKind::kVertexEdge, feature.b, locals,
                       &scratch_.numbers_b);
   }
 
   void LocalContactRows(const ActiveContact& contact, Locals* locals, ContactRows<LocalJet>* rows) {
     const Pose<LocalJet> pose_a = LocalPose(contact.a, locals);
     const Pose<LocalJet> pose_b = LocalPose(contact.b, locals);
-    const ShapeView<LocalJet> shape_a = LocalShapeOfA(contact, locals);
-    const ShapeView<LocalJet> shape_b = LocalShapeOfB(contact, locals);
-    rows->geometry = EvaluateContact(contact.feature, shape_a, pose_a, shape_b, pose_b);
+    const ContactFeature feature = FeatureNow(contact);
+    const ShapeView<LocalJet> shape_a = LocalShapeOfA(contact, feature, locals);
+    const ShapeView<LocalJet> shape_b = LocalShapeOfB(contact, feature, locals);
+    rows->geometry = EvaluateContact(feature, shape_a, pose_a, shape_b, pose_b);
     RowsFromGeometry(shape_a.type, pose_a.position, shape_b.type, pose_b.position, rows);
   }
 

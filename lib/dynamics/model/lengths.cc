@@ -18,7 +18,9 @@ double RadiusOf(const Model<double>& model, int body) {
 
 Aabb BoxOf(const Model<double>& model, int body, const Pose<double>& pose, double margin) {
   const Outline* const outline = model.OutlineOf(body);
+  const Curve* const curve = model.CurveOf(body);
   Aabb box = outline != nullptr ? BoxOfOutline(*outline, pose, margin)
+             : curve != nullptr ? BoxOfCurve(*curve, pose, margin)
                                 : ComputeAabb(model.Shape(body), pose, margin);
   for (int part = 1; part <= model.structure->bodies[body].num_contact_points; ++part) {
     const Aabb point = ComputeAabb(model.Shape(body, part), pose, margin);

@@ -10,6 +10,7 @@
 #include "tangible/dynamics/model/model_seams.h"
 #include "tangible/geometry/mass_properties.h"
 #include "tangible/math/disjoint_sets.h"
+#include "tangible/math/spline_curve.h"
 #include "tangible/scene/coupling.h"
 
 namespace tangible {
@@ -112,6 +113,7 @@ void AddBodies(const BasicScene<T>& scene, Places* places, ModelStructure* struc
     index.shape = body.shape.type;
     index.num_shape_numbers =
         static_cast<int>(body.shape.numbers.size()) + (body.shape.closed ? 2 : 0);
+    if (body.shape.type == ShapeType::kSpline) index.num_shape_numbers *= 2;
     index.shape_numbers = places->Take(index.num_shape_numbers);
     index.num_contact_points = static_cast<int>(body.contact_points.size());
     index.contact_points = places->Take(2 * index.num_contact_points);
@@ -305,8 +307,9 @@ ShapeView<T> ViewOf(const BasicShape<T>& shape) {
   return {shape.type, shape.numbers.data(), static_cast<int>(shape.numbers.size())};
 }
 
-// Appends the numbers of a shape. The points of a polyline are ordered so that the solid is to the
-// left, and the first one is repeated where it is closed (geometry/outline.h).
+// Appends the numbers of a shape. The points of a polyline or spline are ordered so that the solid
+// is to the left, and the first one is repeated where it is closed (geometry/outline.h). The second
+// derivatives of a spline follow (geometry/curve.h).
 template <typename T>
 void AppendShape(const BasicShape<T>& shape, std::vector<T>* numbers) {
   const auto first = static_cast<std::ptrdiff_t>(numbers->size());
@@ -319,6 +322,11 @@ void AppendShape(const BasicShape<T>& shape, std::vector<T>* numbers) {
     for (size_t i = static_cast<size_t>(first); i + 1 < numbers->size(); i += 2) {
       std::swap((*numbers)[i], (*numbers)[i + 1]);
     }
+  }
+  if (shape.type == ShapeType::kSpline) {
+    const std::vector<T> curvatures =
+        SplineCurvatures(std::vector<T>(numbers->begin() + first, numbers->end()));
+    numbers->insert(numbers->end(), curvatures.begin(), curvatures.end());
   }
 }
 

@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "tangible/dynamics/model/state.h"
+#include "tangible/geometry/curve.h"
 #include "tangible/geometry/outline.h"
 #include "tangible/geometry/seams.h"
 #include "tangible/geometry/shape.h"
@@ -213,10 +214,11 @@ inline constexpr int kGravityX = 0;
 inline constexpr int kGravityY = 1;
 
 /// The seams of bodies that do not move, or that move alike, and the outlines of polylines and
-/// concave polygons (model_seams.h).
+/// concave polygons and the curves of splines (model_seams.h).
 struct ModelSeams {
   std::vector<ShapeSeams> shapes;
   std::vector<Outline> outlines;
+  std::vector<Curve> curves;
   FlushSteps steps;
 };
 
@@ -225,8 +227,8 @@ struct Model {
   std::shared_ptr<const ModelStructure> structure;
   std::vector<T> parameters;
   std::shared_ptr<const ModelSeams> seams{};  ///< of a model in double; null: there are none
-  /// Of each body the place in seams->shapes and in seams->outlines; −1: it has none.
-  std::vector<int> seams_of{}, outline_of{};
+  /// Of each body the place in seams->shapes, seams->outlines and seams->curves; −1: it has none.
+  std::vector<int> seams_of{}, outline_of{}, curve_of{};
 
   ShapeView<T> Shape(int body, int part = 0) const {
     const PartIndex index = structure->bodies[body].Part(part);
@@ -245,6 +247,11 @@ struct Model {
   /// The same for a part that is not a contact point.
   const Outline* OutlineOf(int body, int part) const {
     return structure->bodies[body].IsContactPoint(part) ? nullptr : OutlineOf(body);
+  }
+  /// The curve of a body that is a spline, or nullptr; of a part that is not a contact point.
+  const Curve* CurveOf(int body, int part = 0) const {
+    return seams == nullptr || part != 0 || curve_of[body] < 0 ? nullptr
+                                                               : &seams->curves[curve_of[body]];
   }
 };
 

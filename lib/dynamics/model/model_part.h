@@ -42,9 +42,11 @@ struct ModelPart {
     if (whole.seams != nullptr) {
       own->seams_of.resize(bodies.size());
       own->outline_of.resize(bodies.size());
+      own->curve_of.resize(bodies.size());
       for (size_t k = 0; k < bodies.size(); ++k) {
         own->seams_of[k] = whole.seams_of[bodies[k]];
         own->outline_of[k] = whole.outline_of[bodies[k]];
+        own->curve_of[k] = whole.curve_of[bodies[k]];
       }
     }
   }

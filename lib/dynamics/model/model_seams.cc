@@ -66,12 +66,16 @@ void FindModelSeams(const State<double>& state, Model<double>* model) {
   model->seams = nullptr;
   model->seams_of.clear();
   model->outline_of.clear();
+  model->curve_of.clear();
   const ModelStructure& structure = *model->structure;
   std::vector<bool> may_have_seams(structure.bodies.size(), false);
   int count = 0;
   for (int body = 0; body < structure.num_bodies(); ++body) {
     const BodyIndex& index = structure.bodies[body];
-    if (index.shape == ShapeType::kNone || HasOutline(*model, body)) continue;
+    if (index.shape == ShapeType::kNone || index.shape == ShapeType::kSpline ||
+        HasOutline(*model, body)) {
+      continue;
+    }
     if (index.block < 0 && MayHaveSeams(model->Shape(body))) {
       may_have_seams[body] = true;
       ++count;
@@ -80,12 +84,17 @@ void FindModelSeams(const State<double>& state, Model<double>* model) {
   ModelSeams seams;
   std::vector<int> seams_of(structure.bodies.size(), -1);
   std::vector<int> outline_of(structure.bodies.size(), -1);
+  std::vector<int> curve_of(structure.bodies.size(), -1);
   for (int body = 0; body < structure.num_bodies(); ++body) {
+    if (structure.bodies[body].shape == ShapeType::kSpline) {
+      curve_of[body] = static_cast<int>(seams.curves.size());
+      seams.curves.emplace_back(model->Shape(body));
+    }
     if (!HasOutline(*model, body)) continue;
     outline_of[body] = static_cast<int>(seams.outlines.size());
     seams.outlines.emplace_back(model->Shape(body));
   }
-  if (count < 2 && seams.outlines.empty()) {
+  if (count < 2 && seams.outlines.empty() && seams.curves.empty()) {
     return;
   }
   std::vector<std::vector<PlacedShape>> neighbours(structure.bodies.size());
@@ -104,10 +113,11 @@ void FindModelSeams(const State<double>& state, Model<double>* model) {
       seams.shapes.push_back(std::move(own));
     }
   }
-  if (!seams.shapes.empty() || !seams.outlines.empty()) {
+  if (!seams.shapes.empty() || !seams.outlines.empty() || !seams.curves.empty()) {
     model->seams = std::make_shared<const ModelSeams>(std::move(seams));
     model->seams_of = std::move(seams_of);
     model->outline_of = std::move(outline_of);
+    model->curve_of = std::move(curve_of);
   }
 }
 

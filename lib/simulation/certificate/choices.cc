@@ -32,8 +32,8 @@ ChoiceKey KeyOf(ChoiceKind kind, long when, int detail, const ActiveContact& con
              (contact.is_motor ? 4 : 0) + (contact.is_servo ? 8 : 0) +
              (contact.is_support ? 16 : 0) + (contact.is_rolling ? 32 : 0);
   key.feature = static_cast<int>(contact.feature.kind);
-  key.feature_a = contact.feature.a;
-  key.feature_b = contact.feature.b;
+  key.feature_a = contact.feature.FixedA();
+  key.feature_b = contact.feature.FixedB();
   key.part_a = contact.feature.part_a;
   key.part_b = contact.feature.part_b;
   return key;

@@ -347,8 +347,11 @@ bool MeetsACorner(const Model<double>& model, const State<double>& state,
     size = std::min(size, RadiusOf(model, body));
   }
   const auto evaluate = [&](const Pose<double>& pose_a, const ContactFeature& feature) {
-    return EvaluateContact(feature, ShapeOfA(model, contact), pose_a, ShapeOfB(model, contact),
-                           state.PoseOf(b));
+    const ShapeView<double> shape_a = ShapeOfA(model, contact);
+    const ShapeView<double> shape_b = ShapeOfB(model, contact);
+    const Pose<double> pose_b = state.PoseOf(b);
+    return EvaluateContact(FeatureAt(feature, shape_a, pose_a, shape_b, pose_b), shape_a, pose_a,
+                           shape_b, pose_b);
   };
   const Pose<double> first = state.PoseOf(a);
   const ContactGeometry<double> from = evaluate(first, contact.feature);

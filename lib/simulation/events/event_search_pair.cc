@@ -22,6 +22,7 @@ namespace {
 // where rounded corners continue the contact smoothly.
 ActiveContact NextAt(const Model<double>& model, const State<double>& state,
                      const ActiveContact& lost, const ActiveContact& next) {
+  if (lost.feature.places > 0) return next;
   const bool of_first = lost.feature.kind == FeatureKind::kVertexEdge;
   if (!of_first && lost.feature.kind != FeatureKind::kEdgeVertex) {
     return next;
@@ -78,6 +79,8 @@ class EventSearch::PairSearch {
                             [&](const ActiveContact& c) { return IsOfPair(c); })),
         outline_a_(model.OutlineOf(a, parts.a)),
         outline_b_(model.OutlineOf(b, parts.b)),
+        curve_a_(model.CurveOf(a, parts.a)),
+        curve_b_(model.CurveOf(b, parts.b)),
         may_hide_(model.seams != nullptr && !RestsAtSeams()) {}
 
   /// The pair's contact that is handed over where the event is, if there is one.
@@ -102,18 +105,40 @@ class EventSearch::PairSearch {
 
   Features FeaturesAt(const State<double>& state) const {
     Features found;
-    found.count = FindFeatures(model_, a_, state.PoseOf(a_), b_, state.PoseOf(b_), parts_,
-                               kInfinity, found.of);
+    // Of a curve whatever the segment may reach counts, which is a part of it.
+    const double reach = IsAtCurve() ? search_.reach_[a_] + search_.reach_[b_] + touch_ : kInfinity;
+    found.count =
+        FindFeatures(model_, a_, state.PoseOf(a_), b_, state.PoseOf(b_), parts_, reach, found.of);
     return found;
+  }
+  bool IsAtCurve() const { return curve_a_ != nullptr || curve_b_ != nullptr; }
+  // A contact of the pair as it is at a state: along a curve it moves.
+  ActiveContact AtState(const ActiveContact& contact, const State<double>& state) const {
+    ActiveContact moved = contact;
+    if (contact.feature.places > 0 && IsOfPair(contact)) {
+      moved.feature = FeatureAt(contact.feature, ShapeOfA(model_, contact), state.PoseOf(a_),
+                                ShapeOfB(model_, contact), state.PoseOf(b_));
+    }
+    return moved;
+  }
+  // Whether one of the contacts is this one at a state.
+  bool HaveAt(const std::vector<ActiveContact>& contacts, const ActiveContact& contact,
+              const State<double>& state) const {
+    if (!IsAtCurve()) return Contains(contacts, contact);
+    return std::any_of(contacts.begin(), contacts.end(), [&](const ActiveContact& other) {
+      return AtState(other, state).SameAs(contact);
+    });
   }
   bool IsOfPair(const ActiveContact& contact) const {
     return contact.IsOfShapes() && contact.a == a_ && contact.b == b_ &&
            contact.feature.part_a == parts_.a && contact.feature.part_b == parts_.b;
   }
-  bool IsClosed(const ActiveContact& contact) const { return Contains(segment_.contacts, contact); }
-  bool IsDeep(const ActiveContact& contact) const {
+  bool IsClosed(const ActiveContact& contact, const State<double>& state) const {
+    return HaveAt(segment_.contacts, contact, state);
+  }
+  bool IsDeep(const ActiveContact& contact, const State<double>& state) const {
     return std::any_of(touching_.begin(), touching_.end(), [&](const ActiveContact& other) {
-      return other.gap < -kDeepTouches * touch_ && other.SameAs(contact);
+      return other.gap < -kDeepTouches * touch_ && AtState(other, state).SameAs(contact);
     });
   }
   // Whether one of the pair's bodies rests beside a seam of the other one, on which it may go on.
@@ -124,6 +149,8 @@ class EventSearch::PairSearch {
   // The same for a run of an outline that the other body is not over; infinite where they touch,
   // from behind.
   double HiddenRunGap(const State<double>& state, ActiveContact contact);
+  // The same for a spline.
+  double HiddenCurveGap(const State<double>& state, ActiveContact contact);
   // Makes a contact the nearest.
   void TakeNearest(const ActiveContact& contact, const ContactGeometry<double>& geometry);
   // The smallest gap of the contacts that count; sets nearest_.
@@ -170,6 +197,8 @@ class EventSearch::PairSearch {
   /// Of polylines and concave polygons; null: the part is another one.
   const Outline* const outline_a_;
   const Outline* const outline_b_;
+  const Curve* const curve_a_;  ///< of a spline, or null
+  const Curve* const curve_b_;
   const bool may_hide_;  ///< a gap that ends at a seam or a run's end counts
 };
 
@@ -215,7 +244,7 @@ bool EventSearch::PairSearch::Continues(const State<double>& state, const Active
 }
 
 bool EventSearch::PairSearch::RestsAtSeams() const {
-  if (outline_a_ != nullptr || outline_b_ != nullptr) {
+  if (outline_a_ != nullptr || outline_b_ != nullptr || IsAtCurve()) {
     return std::any_of(segment_.contacts.begin(), segment_.contacts.end(),
                        [&](const auto& c) { return c.IsOfShapes() && c.a == a_ && c.b == b_; });
   }
@@ -236,13 +265,14 @@ void EventSearch::PairSearch::TakeNearest(const ActiveContact& contact,
   nearest_ = contact;
   nearest_.gap = geometry.gap;
   normal_ = geometry.normal;
-  on_face_ = contact.feature.kind != FeatureKind::kVertexVertex;
+  on_face_ = contact.feature.kind != FeatureKind::kVertexVertex && contact.feature.places == 0;
 }
 
 double EventSearch::PairSearch::HiddenGap(const State<double>& state) {
   ActiveContact contact;
   contact.a = a_;
   contact.b = b_;
+  if (IsAtCurve()) return HiddenCurveGap(state, contact);
   if (outline_a_ != nullptr || outline_b_ != nullptr) {
     return HiddenRunGap(state, contact);
   }
@@ -259,6 +289,22 @@ double EventSearch::PairSearch::HiddenGap(const State<double>& state) {
   TakeNearest(contact, rows.geometry);
   // What is hidden does not close.
   return std::max(rows.geometry.gap, touch_);
+}
+
+double EventSearch::PairSearch::HiddenCurveGap(const State<double>& state, ActiveContact contact) {
+  const Pose<double> pose_a = state.PoseOf(a_);
+  const Pose<double> pose_b = state.PoseOf(b_);
+  const PairAtCurve pair =
+      curve_a_ != nullptr ? PairAtCurve{curve_a_, pose_a, b_, parts_.b, pose_b, SeamSide::kFirst}
+                          : PairAtCurve{curve_b_, pose_b, a_, parts_.a, pose_a, SeamSide::kSecond};
+  const double gap = DistanceAtCurve(model_, pair, &contact.feature);
+  if (!std::isfinite(gap) || !(gap > touch_)) return kInfinity;
+  contact.feature.part_a = parts_.a;
+  contact.feature.part_b = parts_.b;
+  ContactRows<double> rows;
+  EvaluateContactRows(model_, state, contact, &rows);
+  TakeNearest(contact, rows.geometry);
+  return gap;
 }
 
 double EventSearch::PairSearch::HiddenRunGap(const State<double>& state, ActiveContact contact) {
@@ -297,8 +343,9 @@ double EventSearch::PairSearch::Gap(const Sample& sample, Counts counts, bool ha
   // here, because its gap is rounding: SearchHandOver finds it.
   const bool hands_over =
       closed_ && !handed_over &&
-      std::any_of(segment_.contacts.begin(), segment_.contacts.end(),
-                  [&](const auto& c) { return IsOfPair(c) && !features.Have(c.feature); });
+      std::any_of(segment_.contacts.begin(), segment_.contacts.end(), [&](const auto& c) {
+        return IsOfPair(c) && !features.Have(AtState(c, state).feature);
+      });
   double smallest = kInfinity;
   for (int k = 0; k < features.count; ++k) {
     ActiveContact contact;
@@ -309,9 +356,9 @@ double EventSearch::PairSearch::Gap(const Sample& sample, Counts counts, bool ha
     ContactRows<double> rows;
     EvaluateContactRows(model_, state, contact, &rows);
     const double gap = rows.geometry.gap;
-    if (gap < smallest && !IsClosed(contact) &&
-        (counts == Counts::kAll ? !IsDeep(contact) : !Contains(touching_, contact)) &&
-        !(hands_over && std::abs(gap) <= touch_ && !Contains(touching_, contact))) {
+    if (gap < smallest && !IsClosed(contact, state) &&
+        (counts == Counts::kAll ? !IsDeep(contact, state) : !HaveAt(touching_, contact, state)) &&
+        !(hands_over && std::abs(gap) <= touch_ && !HaveAt(touching_, contact, state))) {
       smallest = gap;
       TakeNearest(contact, rows.geometry);
     }
@@ -387,7 +434,8 @@ KnownCourse EventSearch::PairSearch::CourseOver(double from, double fa, double t
   const double rate_a = SpeedsOf(model_, first->motion.after, start).normal;
   const State<double> before = first->motion.after;
   Sample* const last = search_.At(model_, to);
-  if (Gap(*last, counts) + allowed != fb || !(nearest_.feature == start.feature) ||
+  if (Gap(*last, counts) + allowed != fb ||
+      !(nearest_.feature == AtState(start, last->motion.after).feature) ||
       !search_.MovesLittle(model_, before, last->motion.after, to - from, a_, b_)) {
     return {};
   }
@@ -410,7 +458,8 @@ void EventSearch::PairSearch::SearchFrom(double from, double allowed, Counts cou
     if (!std::isfinite(value)) {
       return value;
     }
-    const bool approaches = value > 0.0 || !all || !Contains(touching_, nearest_) ||
+    const bool approaches = value > 0.0 || !all ||
+                            !HaveAt(touching_, nearest_, sample.motion.after) ||
                             SpeedsOf(model_, sample.motion.after, nearest_).normal < -search_.slow_;
     return approaches ? value : touch_;
   };
@@ -422,10 +471,12 @@ void EventSearch::PairSearch::SearchFrom(double from, double allowed, Counts cou
   if (search_.FirstRoot(model_, shifted, rate, course, located_, from, event_.length, &root) &&
       root > 0.0) {
     event_.length = root;
-    const bool cut_in = Gap(*search_.At(model_, root), counts) < -kDeepTouches * touch_;
+    const Sample& at_root = *search_.At(model_, root);
+    const bool cut_in = Gap(at_root, counts) < -kDeepTouches * touch_;
     // If only the poses have passed the gap, the event is the reversal of the speed.
-    event_.kind =
-        cut_in && all && Contains(touching_, nearest_) ? EventKind::kReturn : EventKind::kTouch;
+    event_.kind = cut_in && all && HaveAt(touching_, nearest_, at_root.motion.after)
+                      ? EventKind::kReturn
+                      : EventKind::kTouch;
     event_.contact = nearest_;
   }
 }
@@ -456,7 +507,7 @@ bool EventSearch::PairSearch::SearchTouching() {
   double from = kInfinity;
   double allowed = touch_;
   for (const ActiveContact& contact : touching_) {
-    if (!IsOfPair(contact) || IsClosed(contact)) {
+    if (!IsOfPair(contact) || IsClosed(contact, segment_.before)) {
       continue;
     }
     if (contact.gap < -kDeepTouches * touch_) {
@@ -482,7 +533,7 @@ bool EventSearch::PairSearch::SearchTouching() {
 const ActiveContact* EventSearch::PairSearch::LostAt(const State<double>& state) const {
   const Features features = FeaturesAt(state);
   for (const ActiveContact& contact : segment_.contacts) {
-    if (IsOfPair(contact) && !features.Have(contact.feature) &&
+    if (IsOfPair(contact) && !features.Have(AtState(contact, state).feature) &&
         (HasPassed(state) || FeaturesAt(segment_.before).Have(contact.feature)) &&
         !Continues(state, contact, features)) {
       return &contact;

@@ -24,7 +24,7 @@ class Signature {
       }
       for (const long x :
            {step, static_cast<long>(c.a), static_cast<long>(c.b), static_cast<long>(c.feature.kind),
-            static_cast<long>(c.feature.a), static_cast<long>(c.feature.b),
+            static_cast<long>(c.feature.FixedA()), static_cast<long>(c.feature.FixedB()),
             static_cast<long>(c.feature.part_a), static_cast<long>(c.feature.part_b),
             static_cast<long>(c.joint), static_cast<long>(c.side), static_cast<long>(c.law),
             static_cast<long>(mode)}) {
