@@ -402,7 +402,7 @@ TEST(SplineTest, DerivativesOfAllMethodsAgree) {
       const std::string size = shape[1] == 'c' ? "radius" : shape[1] == 'b' ? "size/x" : "radii/x";
       ExpectAllAgree(OnGround(R"("shape": {)" + std::string(shape) +
                                   R"(}, "position": [-0.95, 0.75], "velocity": [0.5, 0])",
-                              bowl, {stepping, 0.01, 0.7, 0.3, 0.3}),
+                              bowl, {stepping, 0.01, 0.5, 0.3, 0.3}),
                      {"bodies/b/position/x", "bodies/b/shape/" + size,
                       "bodies/ground/shape/points/0/y", "bodies/ground/shape/points/1/x",
                       "bodies/ground/shape/points/2/y", "bodies/ground/shape/points/4/y"});
