@@ -78,8 +78,8 @@ Curve::Node Curve::Joined(const Node& low, const Node& high) {
   return node;
 }
 
-// F = (x − c)·c' has no root where x − c, which differs from x − the box's centre by at most half of
-// the diagonal, cannot be at a right angle to a direction in the cone.
+// F = (x − c)·c' has no root where x − c cannot be at a right angle to a direction in the cone; it
+// differs from x less the box's centre by at most half of the diagonal.
 bool Curve::MayHaveMinimum(const Node& node, const SplineFoot& foot) {
   const Vector2<double> centre(0.5 * (node.box.min_x + node.box.max_x),
                                0.5 * (node.box.min_y + node.box.max_y));
