@@ -12,9 +12,9 @@
 
 #include "tangible/app/program.h"
 #include "tangible/app/progress.h"
-#include "tangible/app/view_recorder.h"
 #include "tangible/estimation/experiments/cartpole/cart_pole_study.h"
 #include "tangible/render/plot.h"
+#include "tangible/render/recorder/view_recorder.h"
 #include "tangible/scene/json_writer.h"
 
 DEFINE_string(samples, "25,50,100,200,400,800",

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <vector>
 
 #include "tangible/estimation/fit/profile.h"
@@ -10,7 +11,9 @@
 #include "tangible/estimation/results/missing_output.h"
 #include "tangible/estimation/results/noise_output.h"
 #include "tangible/estimation/results/posterior_output.h"
+#include "tangible/estimation/results/report_motion.h"
 #include "tangible/estimation/results/residual_summary.h"
+#include "tangible/estimation/results/residual_tests.h"
 #include "tangible/render/html.h"
 #include "tangible/render/plot.h"
 
@@ -514,6 +517,63 @@ std::string HeldOutPart(const HeldOutRuns* held_out) {
                    rows);
 }
 
+/// A part under its heading, which shows the rest where it is clicked.
+std::string Folded(const std::string& part) {
+  const std::string end = "</h2>\n";
+  const size_t at = part.find(end);
+  if (at == std::string::npos) return part;
+  return "<details>\n<summary>" + part.substr(0, at) + "</h2></summary>\n" +
+         part.substr(at + end.size()) + "</details>\n";
+}
+
+/// What was found, and whether to believe it.
+std::string Verdict(const RecordingsProblem& problem, const FitResult& result,
+                    const FitFindings& findings) {
+  const Uncertainty& uncertainty = result.uncertainty;
+  const std::vector<ParameterEntry>& entries = problem.entries();
+  const std::string rms = CompactNumber(uncertainty.residual_rms, 3) + " sigma";
+  std::vector<std::string> doubts;
+  if (result.status != FitStatus::kConverged) {
+    doubts.push_back("the fit has not converged (" + result.message + ")");
+  }
+  if (!uncertainty.warnings.empty()) doubts.push_back(uncertainty.warnings.front());
+  const Certificate& certificate = result.certificate;
+  if (doubts.empty() && !certificate.verdict.empty() && !IsTrustworthyMap(certificate)) {
+    doubts.push_back("the derivatives at the estimate are not trustworthy: " + certificate.verdict);
+  }
+  std::string text = std::to_string(entries.size()) +
+                     (entries.size() == 1 ? " parameter was" : " parameters were") +
+                     " found from " + std::to_string(result.residuals.size()) +
+                     " measured coordinates, which the fitted motion meets with an rms of " + rms +
+                     ". ";
+  if (doubts.empty()) {
+    text +=
+        "Estimates and intervals can be believed: the fit has converged, and its residuals show "
+        "nothing that the model misses.";
+  } else {
+    text += "Take the intervals with care: " + doubts.front() + ".";
+  }
+  if (findings.missing != nullptr && findings.missing->message.empty()) {
+    text += " What would explain the residuals: " + Conclusion(*findings.missing) + ".";
+  }
+  return "<p class=\"verdict\">" + HtmlEscape(text) + "</p>\n";
+}
+
+/// The player of one recording.
+std::string MotionPart(const RecordingsProblem& problem, const FitResult& result) {
+  const int recording = WorstRecording(problem, result);
+  const std::optional<ViewData> motion = ObservedMotion(problem, result, recording);
+  if (!motion) return "";
+  const ViewOptions small{.max_frames = 1200, .max_entries = 50000};
+  return "<h2>Fitted and observed motion</h2>\n" +
+         (problem.IsNamed()
+              ? "<p>Recording " + HtmlEscape(problem.recordings()[recording].name) +
+                    (problem.num_blocks() > 1 ? ", whose residuals are the largest.</p>\n"
+                                              : ".</p>\n")
+              : std::string()) +
+         ViewPart(*motion, small);
+}
+
 }  // namespace
 
 std::string FitReport(const std::string& title, const RecordingsProblem& problem,
@@ -522,21 +582,24 @@ std::string FitReport(const std::string& title, const RecordingsProblem& problem
   const std::vector<ParameterEntry>& entries = problem.entries();
   const ResidualSummary summary = SummarizeResiduals(problem, result.residuals);
   const PredictionScore* const score = findings.later == nullptr ? nullptr : &findings.later->score;
-  return HtmlPage(
-      heading,
-      "<h1>" + HtmlEscape(heading) + "</h1>\n<h2>Estimates</h2>\n" +
-          EstimateTable(entries, result) + Warnings(result.uncertainty) +
-          ProfilePlots(entries, result) + (findings.missing ? MissingPart(*findings.missing) : "") +
-          (findings.posterior ? PosteriorPart(entries, *findings.posterior) : "") +
-          (findings.design ? DesignPart(entries, *findings.design) : "") +
-          CombinationTable(result.uncertainty) + ProcessNoisePart(findings.components) +
-          SpreadTable(findings.components) + SummaryTable(result) +
-          RecordingTable(problem, result) + NoiseTable(findings.components) +
-          RadiusTable(result.certificate) + CorrelationTable(entries, result) +
-          StepTable(entries, findings.check) + PredictionPart("Prediction", score) +
-          HeldOutPart(findings.held_out) + StartTable(result) + IterationPlots(entries, result) +
-          ResidualTable(summary) + OutlierTable(summary) +
-          SeriesPlots(CollectSeries(problem, result), summary.series.size()));
+  std::string body = "<h1>" + HtmlEscape(heading) + "</h1>\n" + Verdict(problem, result, findings) +
+                     MotionPart(problem, result) + "<h2>Estimates</h2>\n" +
+                     EstimateTable(entries, result) + Warnings(result.uncertainty) +
+                     ProfilePlots(entries, result);
+  if (findings.posterior != nullptr) body += PosteriorPart(entries, *findings.posterior);
+  body += CombinationTable(result.uncertainty) + CorrelationTable(entries, result);
+  if (findings.missing != nullptr) body += MissingPart(*findings.missing);
+  body += ProcessNoisePart(findings.components) + SpreadTable(findings.components) +
+          NoiseTable(findings.components) + PredictionPart("Prediction", score) +
+          HeldOutPart(findings.held_out) + RecordingTable(problem, result);
+  if (findings.design != nullptr) body += DesignPart(entries, *findings.design);
+  body += ResidualTestsPart(problem, result) +
+          SeriesPlots(CollectSeries(problem, result), summary.series.size()) +
+          Folded(ResidualTable(summary)) + Folded(OutlierTable(summary)) +
+          Folded(RadiusTable(result.certificate)) + StepTable(entries, findings.check) +
+          StartTable(result) + Folded("<h2>Of the fit</h2>\n" + SummaryTable(result)) +
+          Folded(IterationPlots(entries, result));
+  return HtmlPage(heading, body);
 }
 
 }  // namespace tangible

@@ -6,10 +6,10 @@
 
 #include "tangible/app/program.h"
 #include "tangible/app/trajectory_csv.h"
-#include "tangible/app/view_recorder.h"
 #include "tangible/control/engine_step.h"
 #include "tangible/render/html.h"
 #include "tangible/render/plot.h"
+#include "tangible/render/recorder/view_recorder.h"
 
 namespace tangible {
 namespace {

@@ -13,7 +13,7 @@
 #include "tangible/app/observation_csv.h"
 #include "tangible/app/run_summary.h"
 #include "tangible/app/trajectory_csv.h"
-#include "tangible/app/view_recorder.h"
+#include "tangible/render/recorder/view_recorder.h"
 #include "tangible/simulation/certificate/certify.h"
 
 namespace tangible {

@@ -18,6 +18,7 @@
 #include "tangible/estimation/results/design_output.h"
 #include "tangible/estimation/results/fit_json.h"
 #include "tangible/estimation/results/fitted_scene.h"
+#include "tangible/estimation/results/missing_output.h"
 #include "tangible/estimation/results/noise_output.h"
 #include "tangible/estimation/results/prediction.h"
 #include "tangible/estimation/results/report.h"
@@ -88,6 +89,7 @@ class FitProblemOf {
     std::vector<std::string> profiles;  // of these parameters
     std::string design, design_name;    // a file of candidates as text, or empty
     Parts parts;
+    bool missing = false;  // whether it is asked what would explain the residuals
   };
 
   int num_starts() const { return NumStarts(fit_.input.options()); }
@@ -140,6 +142,7 @@ class FitProblemOf {
     const std::string refused =
         RefusedWithNoise(*problem_, {{"design", !wanted.design.empty()},
                                      {"profile", !wanted.profiles.empty()},
+                                     {"missing", wanted.missing},
                                      {"checkpoint", !wanted.checkpoint.empty()},
                                      {"discretisation_check", wanted.discretisation_check}});
     if (!refused.empty()) throw Error(refused);
@@ -178,6 +181,10 @@ class FitProblemOf {
     if (!fit_.held_out.empty() && any) {
       findings.held_out = &held_out.emplace(
           PredictHeldOut(fit_.input, *problem_, result.estimate, components.noise, fit_.held_out));
+    }
+    std::optional<MissingResult> missing;
+    if (any && (wanted.missing || fit_.input.options().missing == MissingPass::kRun)) {
+      findings.missing = &missing.emplace(FindMissing({}, fit_.input, result, problem_.get()));
     }
     std::optional<Design> design;
     if (!request.candidates.empty() && any) {
@@ -371,7 +378,7 @@ void BindFit(py::module_* module) {
               const std::string& checkpoint, const py::object& on_iteration,
               const std::vector<std::string>& profiles, const std::vector<std::string>& starts_done,
               const std::vector<std::string>& profiles_done, const std::string& design,
-              const std::string& design_name) {
+              const std::string& design_name, bool missing) {
              return fit.Run({max_iterations,
                              predict_from,
                              discretisation_check,
@@ -380,7 +387,8 @@ void BindFit(py::module_* module) {
                              profiles,
                              design,
                              design_name,
-                             {starts_done, profiles, profiles_done}});
+                             {starts_done, profiles, profiles_done},
+                             missing});
            });
 }
 

@@ -302,6 +302,25 @@ void WritePoses(const ViewData& data, const std::vector<ViewFrame>& frames, Json
   json->Close(']');
 }
 
+/// Of each frame x and y of what was observed, then of what was fitted, of each place.
+void WriteMarks(const std::vector<ViewFrame>& frames, JsonWriter* json) {
+  const auto has_marks = [](const ViewFrame& frame) { return !frame.marks.empty(); };
+  if (std::none_of(frames.begin(), frames.end(), has_marks)) return;
+  json->Key("marks");
+  json->Open('[');
+  for (const ViewFrame& frame : frames) {
+    json->Open('[');
+    for (const ViewMark& mark : frame.marks) {
+      for (const double number :
+           {mark.observed.x(), mark.observed.y(), mark.fitted.x(), mark.fitted.y()}) {
+        json->Number(number);
+      }
+    }
+    json->Close(']');
+  }
+  json->Close(']');
+}
+
 std::string DataJson(const ViewData& data, const std::vector<ViewFrame>& frames) {
   JsonWriter json;
   json.Open('{');
@@ -314,6 +333,7 @@ std::string DataJson(const ViewData& data, const std::vector<ViewFrame>& frames)
   WriteSeries("potential", frames, &ViewFrame::potential_energy, &json);
   WritePoses(data, frames, &json);
   WriteContacts(frames, &json);
+  WriteMarks(frames, &json);
   json.Close('}');
   return json.Result();
 }
@@ -352,11 +372,12 @@ constexpr char kControls[] = R"html(
 <div class="curves"><canvas id="energy"></canvas></div></div>
 <div class="side">
 <section class="legend"><h2>Legend</h2><div id="legend" style="display:block"></div>
-<small id="impulse-scale"></small></section>
+<small id="impulse-scale"></small> <small id="residual-scale"></small></section>
 <section>
 <label><input type="checkbox" id="show_joints" checked>joints and springs</label>
 <label><input type="checkbox" id="show_contacts" checked>contacts and impulses</label>
-<label><input type="checkbox" id="show_names">names</label></section>
+<label><input type="checkbox" id="show_names">names</label>
+<label id="marks"><input type="checkbox" id="show_marks" checked>observed places, residuals</label></section>
 <section class="contacts"><h2>Contacts <span id="contact-count"></span></h2>
 <table><thead><tr><th>bodies</th><th>normal<br>N s</th><th>tangent<br>N s</th></tr></thead>
 <tbody id="contact-rows"></tbody></table></section>
@@ -364,6 +385,12 @@ constexpr char kControls[] = R"html(
 Click the energy plot to go to a time.</small></section>
 </div>
 )html";
+
+/// The data and what draws them.
+std::string Scripts(const ViewData& data, const std::vector<ViewFrame>& frames) {
+  return "<script type=\"application/json\" id=\"data\">" + DataJson(data, frames) +
+         "</script>\n<script>\n" + kViewScript + "</script>\n";
+}
 
 }  // namespace
 
@@ -424,11 +451,13 @@ std::string ViewHtml(const ViewData& data, const ViewOptions& options) {
   html += kControls;
   html += "</div>\n";
   if (!options.below.empty()) html += "<div class=\"below\">" + options.below + "</div>\n";
-  html += "<script type=\"application/json\" id=\"data\">" + DataJson(data, frames) + "</script>\n";
-  html += "<script>\n";
-  html += kViewScript;
-  html += "</script>\n</body>\n</html>\n";
-  return html;
+  return html + Scripts(data, frames) + "</body>\n</html>\n";
+}
+
+std::string ViewPart(const ViewData& data, const ViewOptions& options) {
+  return std::string("<style>\n") + kViewStyle +
+         "</style>\n<div class=\"view part\"><div class=\"app\">\n" + kControls + "</div></div>\n" +
+         Scripts(data, ThinFrames(data, options));
 }
 
 }  // namespace tangible

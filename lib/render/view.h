@@ -59,6 +59,12 @@ struct ViewContact {
   std::string mode;  ///< open, sticking, sliding_left, ...: written unchanged
 };
 
+/// A place that was observed, and where a fitted motion has it; both m, world.
+struct ViewMark {
+  Vector2<double> observed = Vector2<double>::Zero();
+  Vector2<double> fitted = Vector2<double>::Zero();
+};
+
 /// The scene at one time.
 struct ViewFrame {
   double time = 0.0;                   ///< s
@@ -66,6 +72,7 @@ struct ViewFrame {
   std::vector<ViewContact> contacts;   ///< of the step that ended here
   double kinetic_energy = 0.0;         ///< J
   double potential_energy = 0.0;       ///< J, of gravity and springs
+  std::vector<ViewMark> marks = {};    ///< the latest observation of each place
 };
 
 struct ViewData {
@@ -97,5 +104,9 @@ std::vector<ViewFrame> ThinFrames(const ViewData& data, const ViewOptions& optio
 /// that do not exist are drawn as the world, and a frame with the wrong number of poses is left
 /// out.
 std::string ViewHtml(const ViewData& data, const ViewOptions& options = {});
+
+/// The same player as a part of another page, which has at most one. Keys act while it has the
+/// focus, and the wheel zooms with Ctrl alone. Without a header; `below` is not used.
+std::string ViewPart(const ViewData& data, const ViewOptions& options = {});
 
 }  // namespace tangible

@@ -5,7 +5,7 @@ const view = JSON.parse(document.getElementById("data").textContent);
 const $ = (id) => document.getElementById(id);
 const stage = $("stage"), context = stage.getContext("2d");
 const camera = {x: 0, y: 0, scale: 100};
-const show = {joints: true, contacts: true, names: false};
+const show = {joints: true, contacts: true, names: false, marks: true};
 let colours = {};
 
 function readColours() {
@@ -101,6 +101,11 @@ function motionBounds() {
   });
   for (const link of [...view.joints, ...view.springs]) {
     link.bodies.forEach((body, j) => { if (body < 0 && link.anchors[j]) add(box, ...link.anchors[j], 0); });
+  }
+  for (const frame of view.marks || []) {
+    for (let i = 0; i < frame.length; i += 4) {
+      if (frame[i] !== null && frame[i + 1] !== null) add(box, frame[i], frame[i + 1], 0);
+    }
   }
   if (!(box[0] <= box[2])) box = still[0] <= still[2] ? still : [-1, -1, 1, 1];
   const room = 0.5 * Math.max(box[2] - box[0], box[3] - box[1]);
@@ -363,6 +368,36 @@ function drawContact(g, c) {
   disc(g, p, 4.2); g.fill(); g.stroke();
 }
 
+// Residuals are small beside the motion: the longest arrow is about an eighth of what is shown.
+const marks = view.marks || [];
+const finite = (numbers) => numbers.every((number) => number !== null);
+let residualFactor = 1;
+function magnifyResiduals() {
+  let longest = 0;
+  for (const frame of marks) {
+    for (let i = 0; i < frame.length; i += 4) {
+      const m = frame.slice(i, i + 4);
+      if (finite(m)) longest = Math.max(longest, Math.hypot(m[2] - m[0], m[3] - m[1]));
+    }
+  }
+  const box = motionBounds(), extent = Math.max(box[2] - box[0], box[3] - box[1]);
+  if (!(longest > 0) || !(extent > 0)) return;
+  const wanted = 0.125 * extent / longest, power = Math.pow(10, Math.floor(Math.log10(wanted)));
+  residualFactor = Math.max(1, power * (wanted / power >= 5 ? 5 : wanted / power >= 2 ? 2 : 1));
+}
+function drawMarks(g, k) {
+  const all = marks[k] || [];
+  for (let i = 0; i < all.length; i += 4) {
+    const m = all.slice(i, i + 4);
+    if (!finite(m)) continue;
+    const p = toScreen([m[0], m[1]]), long = residualFactor * camera.scale;
+    g.strokeStyle = colours.text; g.lineWidth = 1.6;
+    line(g, [p[0] - 5, p[1]], [p[0] + 5, p[1]]); line(g, [p[0], p[1] - 5], [p[0], p[1] + 5]);
+    g.strokeStyle = g.fillStyle = colours.series[4]; g.lineWidth = 2;
+    arrow(g, p, [p[0] + long * (m[2] - m[0]), p[1] - long * (m[3] - m[1])]);
+  }
+}
+
 function drawStage(k, hovered) {
   const g = context, ratio = devicePixelRatio || 1;
   g.setTransform(ratio, 0, 0, ratio, 0, 0);
@@ -380,6 +415,7 @@ function drawStage(k, hovered) {
     for (const joint of view.joints) drawJoint(g, joint, k);
   }
   if (show.contacts) for (const contact of view.contacts[k]) drawContact(g, contact);
+  if (show.marks) drawMarks(g, k);
   drawTickLabels(g);
   if (!show.names) return;
   g.font = "12px system-ui, sans-serif"; g.textAlign = "left"; g.textBaseline = "middle";

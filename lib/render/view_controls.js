@@ -12,6 +12,9 @@ const readings = curves.map(([name, , colour]) => {
   $("energy-key").append(entry);
   return text;
 });
+// In a page with other content the player keeps to itself.
+const part = document.querySelector(".view.part");
+if (part) stage.tabIndex = 0;
 let frame = 0, clock = start, playing = false, hovered = -1, before = 0, fitted = true;
 
 function energyMap() {
@@ -133,6 +136,10 @@ function legend() {
       g.strokeStyle = colours.text; g.lineWidth = 1.2; line(g, [11, 5], [19, 13]); line(g, [11, 13], [19, 5]);
     });
   }
+  if (marks.length) {
+    add("observed", (g) => { g.strokeStyle = colours.text; g.lineWidth = 1.6; line(g, [10, 9], [20, 9]); line(g, [15, 4], [15, 14]); });
+    add("fitted − observed", (g) => { g.lineWidth = 2; g.strokeStyle = g.fillStyle = colours.series[4]; arrow(g, [2, 9], [28, 9]); });
+  }
   if (view.springs.length) {
     add("spring", (g) => {
       g.strokeStyle = colours.series[5]; g.lineWidth = 1.6; g.beginPath(); g.moveTo(1, 9);
@@ -240,6 +247,7 @@ stage.addEventListener("pointermove", (event) => {
   hover(event);
 });
 stage.addEventListener("wheel", (event) => {
+  if (part && !event.ctrlKey) return;
   event.preventDefault();
   const p = at(stage, event), old = fromScreen(p);
   camera.scale *= Math.exp(-0.0015 * event.deltaY);
@@ -267,6 +275,7 @@ for (const name of Object.keys(show)) {
 }
 const keys = {" ": "play", ArrowLeft: "back", ArrowRight: "forward", Home: "first", End: "last", f: "fit", "+": "zoom_in", "-": "zoom_out"};
 document.addEventListener("keydown", (event) => {
+  if (part && !part.contains(event.target)) return;
   if (!keys[event.key] || event.target.tagName === "SELECT" || event.ctrlKey || event.metaKey) return;
   if (event.target.tagName === "BUTTON" && event.key === " ") return;
   event.preventDefault();
@@ -279,6 +288,9 @@ const resized = new ResizeObserver(resize);
 for (const canvas of [stage, energy]) resized.observe(canvas);
 readColours();
 legend();
+magnifyResiduals();
+$("marks").hidden = !marks.length;
+if (marks.length) $("residual-scale").textContent = `Residuals are drawn ${residualFactor} times as long as they are.`;
 // page.html#t=0.5 opens at that time.
 const wanted = /[#&]t=([0-9.eE+-]+)/.exec(location.hash);
 if (wanted) frame = frameAt(Number(wanted[1]));

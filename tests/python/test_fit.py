@@ -146,3 +146,21 @@ def test_the_next_experiment_is_designed(tmp_path: Path) -> None:
     ]:
         with pytest.raises(tangible.TangibleError, match=said):
             tangible.fit(scene, data, ["gravity/y"], sigma=0.01, design=wrong)
+
+
+@pytest.mark.filterwarnings("ignore::tangible.TangibleWarning")
+def test_what_is_missing_is_named() -> None:
+    scene = tangible.Scene(simulation={"stepping": "event", "dt": 0.05, "duration": 2.0})
+    scene.add_body("ball", mass=2.0, inertia=1.0, position=[0, 0], velocity=[2, 3])
+    run = tangible.simulate(scene)
+    noise = 0.01 * np.random.default_rng(1).normal(size=(2, 41))
+    # Along x the pixels are five percent narrower than the model has them.
+    data = {"time": run.times, "x": 1.05 * run["ball/x"] + noise[0], "y": run["ball/y"] + noise[1]}
+    result = tangible.fit(scene, data, ["gravity/y", "bodies/ball/velocity/y"], sigma=0.01, missing=True)
+    first = result.missing[0]
+    names = [first["candidate"], *first["equivalent"]]
+    assert first["confirmed"] and first["refitted"] and "sensors/x/gain" in names
+    assert first["cost_share"] > 0.5 and first["held_out_gain"] > 0.5
+    assert "What would explain the residuals" in result.report()
+    without = tangible.fit(scene, data, ["gravity/y", "bodies/ball/velocity/y"], sigma=0.01)
+    assert without.missing == [] and without.estimates == result.estimates

@@ -91,7 +91,7 @@ class Fit:
     def evaluate(self, arg0: _Floats, arg1: bool) -> tuple[_Floats, _Floats | None]: ...
     def run(
         self, arg0: int, arg1: float, arg2: bool, arg3: str, arg4: object, arg5: list[str],
-        arg6: list[str], arg7: list[str], arg8: str, arg9: str
+        arg6: list[str], arg7: list[str], arg8: str, arg9: str, arg10: bool
     ) -> tuple[str, str, str, list[Scene]]: ...
 
 class Control:

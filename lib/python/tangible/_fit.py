@@ -261,6 +261,14 @@ class FitResult:
         return dict(self.data.get("design") or {})
 
     @property
+    def missing(self) -> list[dict[str, Any]]:
+        """What would explain the residuals, the best first: of each `candidate` its `kind`, the
+        `cost_share` to first order, whether it was `refitted`, with the `refitted_cost_share`, the
+        `held_out_gain` and whether these make it `confirmed`, which candidates are `equivalent`,
+        and its `parameters`; empty unless `missing` was asked for."""
+        return list(self.data.get("missing") or [])
+
+    @property
     def process_noise(self) -> list[dict[str, Any]]:
         """Of each random force that `process_noise` asks for its `intensity` (in `unit`),
         `interval_95` where it is `estimated`, and `forces`: of each recording arrays of `time`,
@@ -437,6 +445,7 @@ def fit(
     predict_from: float | None = None,
     profile: Sequence[str] = (),
     design: FitLike | None = None,
+    missing: bool = False,
     discretisation_check: bool = False,
     checkpoint: str | os.PathLike[str] | None = None,
     callback: Callable[[dict[str, Any]], object] | None = None,
@@ -474,6 +483,8 @@ def fit(
         design: Candidates for the next experiment, as `tangible-fit --design` reads them: a file, or
             {"candidates": [{"values": {path: number}, "duration": s, "camera": name}, ...],
             "wanted": {parameter: width}}; what each would narrow stands in `FitResult.design`.
+        missing: Whether it is asked what would explain the residuals, with real fits of the best
+            candidates: `FitResult.missing`.
         discretisation_check: Whether it is fitted with half the step too, which shows its bias.
         checkpoint: A file that keeps the fit's evaluations: where the fit is interrupted, the same
             call goes on from it, with the same bits.
@@ -531,6 +542,7 @@ def fit(
                 starts_done,
                 profiles_done,
                 *candidates,
+                missing,
             )
     finally:
         if progress:

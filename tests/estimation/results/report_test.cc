@@ -24,7 +24,7 @@ TEST(ReportTest, ShowsEstimatesIntervalsAndWarnings) {
   EXPECT_TRUE(Has(html, "<svg"));
   // One self-contained page.
   EXPECT_FALSE(Has(html, "src=\"http"));
-  EXPECT_FALSE(Has(html, "nan"));
+  for (const char* none : {">nan", " nan", ",nan", "\"nan"}) EXPECT_FALSE(Has(html, none)) << none;
 }
 
 TEST(ReportTest, ResidualsAreSummedByCoordinate) {

@@ -15,6 +15,8 @@ class ViewRecorder {
   void Add(const Model<double>& model, double t, const State<double>& state,
            const StepRecord* record);
   const ViewData& data() const { return data_; }
+  /// The same, to be completed.
+  ViewData* mutable_data() { return &data_; }
 
  private:
   void AddContacts(const Model<double>& model, const StepRecord& record, ViewFrame* frame) const;

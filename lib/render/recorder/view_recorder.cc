@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tangible/app/view_recorder.h"
+#include "tangible/render/recorder/view_recorder.h"
 
 #include "tangible/dynamics/elements/joint.h"
 #include "tangible/simulation/certificate/certify.h"
