@@ -78,15 +78,19 @@ Curve::Node Curve::Joined(const Node& low, const Node& high) {
   return node;
 }
 
-// F = (x − c)·c' has no root where x − c cannot be at a right angle to a direction in the cone; it
-// differs from x less the box's centre by at most half of the diagonal.
+// F = (x − c)·c' has no root where w = x − c cannot be at a right angle to a direction in the cone
+// about d, |w·d| > |w| sin(spread). Of w's component along d and of |w| the box gives bounds, here
+// without roots.
 bool Curve::MayHaveMinimum(const Node& node, const SplineFoot& foot) {
-  const Vector2<double> centre(0.5 * (node.box.min_x + node.box.max_x),
-                               0.5 * (node.box.min_y + node.box.max_y));
-  const Vector2<double> diagonal(node.box.max_x - node.box.min_x, node.box.max_y - node.box.min_y);
-  const double half = 0.5 * diagonal.norm() + std::max(foot.axes[0], foot.axes[1]);
-  const Vector2<double> apart = foot.point - centre;
-  return std::abs(apart.dot(node.direction)) <= half + node.sine * (apart.norm() + half);
+  const double axis = std::max(foot.axes[0], foot.axes[1]);
+  const double half_x = 0.5 * (node.box.max_x - node.box.min_x) + axis;
+  const double half_y = 0.5 * (node.box.max_y - node.box.min_y) + axis;
+  const Vector2<double> apart(foot.point.x() - 0.5 * (node.box.min_x + node.box.max_x),
+                              foot.point.y() - 0.5 * (node.box.min_y + node.box.max_y));
+  const Vector2<double>& d = node.direction;
+  const double along = std::abs(apart.dot(d)) - half_x * std::abs(d.x()) -
+                       half_y * std::abs(d.y()) - node.sine * (half_x + half_y);
+  return along <= 0.0 || along * along <= node.sine * node.sine * apart.squaredNorm();
 }
 
 void Curve::VisitNode(int node, int low, int high, const SplineFoot& foot, const Aabb& box,
