@@ -7,6 +7,7 @@
 #include <numeric>
 #include <vector>
 
+#include "tangible/estimation/results/tolerances.h"
 #include "tangible/estimation/uncertainty/binned_test.h"
 #include "tangible/render/html.h"
 #include "tangible/render/plot.h"
@@ -45,6 +46,8 @@ class AgainstAll {
     }
     std::vector<Against> all;
     for (auto& [key, one] : by_key_) {
+      const auto [low, high] = std::minmax_element(one.x.begin(), one.x.end());
+      if (*high - *low <= kNoRange * std::max(std::abs(*low), std::abs(*high))) continue;
       one.test = TestBins(one.x, one.residuals, kResidualBins);
       if (!one.test.at.empty()) all.push_back(std::move(one));
     }
