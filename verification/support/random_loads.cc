@@ -313,7 +313,8 @@ void SceneMaker::RollingFriction() {
 }
 
 void SceneMaker::Supports() {
-  if (seed_ % 4 != 2 || options_.stepping == Stepping::kEvent) {
+  const bool by_events = options_.stepping == Stepping::kEvent;
+  if (by_events ? seed_ % 16 != 10 : seed_ % 4 != 2) {
     return;
   }
   RandomNumbers random(0x73757070ULL + 0x9e3779b97f4a7c15ULL * seed_);

@@ -172,6 +172,11 @@ class ProblemBuilder {
     AddRowTransposed(s_.bodies[a].block, row_a, s_.bodies[b].block, row_b, amount, p_.load.data());
   }
 
+  void Dampen(int body, const RowPart<T>& row, const T& damping) {
+    const RowPart<T> none{T(0.0), T(0.0), T(0.0)};
+    p_.dampers.push_back({s_.bodies[body].block, -1, row, none, damping});
+  }
+
   void AddForce(int body, const T value[3]) {
     for (int i = 0; i < 3; ++i) {
       p_.load[3 * s_.bodies[body].block + i] += value[i];
@@ -222,14 +227,14 @@ class ProblemBuilder {
   }
 
   // Every support has a block, so that those of others stay where they are as it holds or slides.
-  void Hold(int k, const RowPart<T>* rows, int count) {
+  void Hold(int k, const RowPart<T>* rows, const T* rhs, int count) {
     JointBlock<T>& block = p_.joints.emplace_back();
     block.a = s_.bodies[s_.supports[k].body].block;
     block.rows = count;
     for (int r = 0; r < count; ++r) {
       block.row_a[r] = rows[r];
       block.row_b[r] = {T(0.0), T(0.0), T(0.0)};
-      block.rhs[r] = T(0.0);
+      block.rhs[r] = rhs[r];
     }
     // The rows of joints to what stands still, or of joints between bodies that are held, may be
     // dependent on these.

@@ -24,11 +24,12 @@
 //
 //   Body(k, mass, load)                       M x = load
 //   Push(a, row_a, b, row_b, amount)          load += rowᵀ amount
+//   Dampen(body, row, damping)                 load −= rowᵀ damping (row · x)
 //   AddForce(body, value)                     the same of a force or impulse on one body
 //   Along(a, row_a, b, row_b, push, damping)  load += rowᵀ (push − damping · speed)
 //   Decay(a, row_a, b, row_b, numbers)        load += rowᵀ FrictionDecay(numbers, speed)
 //   Joint(j, rows, rhs)                       row · x = rhs − prescribed speed
-//   Hold(support, rows, count)                row · x = 0 of its body
+//   Hold(support, rows, rhs, count)           row · x = rhs of its body
 //   Share(j, k, rows, rhs)                    coordinate k's share of a coupling's row; builders
 //                                             that keep joints receive the whole row
 //   BeginShare(k)                             the contact that follows is one such share
@@ -183,14 +184,15 @@ class Equations {
 
   /// Friction of a body on the plane of motion: each point of its support is an element.
   void Support(int k) {
-    if constexpr (kLevel == Level::kVelocity) {
+    if constexpr (kLevel != Level::kCorrection) {
       const SupportIndex& support = s_.supports[k];
-      const SupportState* at = Weight() > 0.0 ? b_.SupportAt(k) : nullptr;
+      const SupportState* at = b_.SupportAt(k);
       if (at == nullptr) return Hold(k, -1);
       if (at->holds == SupportState::kBody) return HoldBody(k);
-      if (support.kind == SupportIndex::kDisc) {
+      // At an instant friction, which is a force, does nothing; what is held stays so.
+      if (Weight() > 0.0 && support.kind == SupportIndex::kDisc) {
         DiscSlides(support, *at);
-      } else {
+      } else if (Weight() > 0.0) {
         for (int i = 0; i < support.num_points; ++i) {
           if (i != at->holds) PointSlides(support, i, *at);
         }
@@ -357,30 +359,50 @@ class Equations {
     const Vector2<T> arm = ArmOf(support, point, &share);
     const T* x = b_.Numbers(support.numbers, 2, cone);
     const T limit = Weight() * x[SupportIndex::kFriction] * x[SupportIndex::kLoad] * share;
-    const Vector2<T> velocity(at.twist[0] - at.twist[2] * arm.y(),
-                              at.twist[1] + at.twist[2] * arm.x());
+    T buffer[3];
+    const T* twist = TwistOf(support, at, point, buffer);
+    const Vector2<T> velocity(twist[0] - twist[2] * arm.y(), twist[1] + twist[2] * arm.x());
     const T square = velocity.squaredNorm();
     if (!(ValueOf(square) > 0.0)) return;
     const T speed = sqrt(square);
     const Vector2<T> along = velocity / speed;
     const RowPart<T> none{T(0.0), T(0.0), T(0.0)};
     b_.Push(support.body, PointRow(along, arm), s_.world(), none, T(-limit));
-    b_.Along(support.body, PointRow(Vector2<T>(-along.y(), along.x()), arm), s_.world(), none,
-             T(0.0), T(limit / speed));
+    const RowPart<T> across = PointRow(Vector2<T>(-along.y(), along.x()), arm);
+    if constexpr (kLevel == Level::kVelocity) {
+      b_.Along(support.body, across, s_.world(), none, T(0.0), T(limit / speed));
+    } else if (at.is_sought) {
+      b_.Dampen(support.body, across, T(limit / speed));
+    }
+  }
+
+  // The twist that tells the direction of a point's friction: of a step that about which it is
+  // linearised, and of accelerations the body's own, except where it is next to nothing.
+  const T* TwistOf(const SupportIndex& support, const SupportState& at, int point, T buffer[3]) {
+    if (kLevel == Level::kAcceleration && !at.IsSlow(point)) {
+      return b_.TwistOf(support.body, buffer);
+    }
+    for (int i = 0; i < 3; ++i) buffer[i] = T(at.twist[i]);
+    return buffer;
   }
 
   // The friction at û and, as dampers, Ψ'' in the form Σ d lᵀ l of a Cholesky factorisation.
   void DiscSlides(const SupportIndex& support, const SupportState& at) {
     b_.Begin();
-    T buffer[3], friction[3];
+    T buffer[3], friction[3], own[3];
     const T* x = b_.Numbers(support.numbers, 3, buffer);
-    const T twist[3] = {T(at.twist[0]), T(at.twist[1]), T(at.twist[2])};
+    const T* twist = TwistOf(support, at, 0, own);
     DiscFriction(x[SupportIndex::kRadius], twist, friction);
     const T limit = Weight() * x[SupportIndex::kFriction] * x[SupportIndex::kLoad];
     const double weight = ValueOf(limit);
     const double radius = ValueOf(x[SupportIndex::kRadius]);
     for (T& component : friction) component *= limit;
     b_.AddForce(support.body, friction);
+    if (kLevel == Level::kVelocity || at.is_sought) DiscDampersOf(support, at, radius, weight);
+  }
+
+  void DiscDampersOf(const SupportIndex& support, const SupportState& at, double radius,
+                     double weight) {
     double rows[3][3], weights[3];
     DiscDampers(radius, at.twist.data(), rows, weights);
     b_.Begin();
@@ -389,14 +411,20 @@ class Equations {
       double speed = 0.0;
       for (int i = 0; i < 3; ++i) speed += rows[r][i] * at.twist[i];
       const RowPart<T> row{T(rows[r][0]), T(rows[r][1]), T(rows[r][2])};
-      b_.Along(support.body, row, s_.world(), none, T(weight * weights[r] * speed),
-               T(weight * weights[r]));
+      const T damping(weight * weights[r]);
+      if constexpr (kLevel == Level::kVelocity) {
+        b_.Along(support.body, row, s_.world(), none, T(damping * speed), damping);
+      } else {
+        b_.Push(support.body, row, s_.world(), none, T(damping * speed));
+        b_.Dampen(support.body, row, damping);
+      }
     }
   }
 
   // The rows of a point that is held; −1: none.
   void Hold(int k, int point) {
     RowPart<T> rows[3];
+    T rhs[3] = {T(0.0), T(0.0), T(0.0)};
     int count = 0;
     if (point >= 0) {
       b_.Begin();
@@ -404,9 +432,14 @@ class Equations {
       const Vector2<T> arm = ArmOf(s_.supports[k], point, &share);
       rows[0] = PointRow(Vector2<T>(T(1.0), T(0.0)), arm);
       rows[1] = PointRow(Vector2<T>(T(0.0), T(1.0)), arm);
+      if constexpr (kLevel == Level::kAcceleration) {
+        T buffer[3];
+        const T turn = b_.TwistOf(s_.supports[k].body, buffer)[2];
+        for (int i = 0; i < 2; ++i) rhs[i] = turn * turn * arm[i];
+      }
       count = 2;
     }
-    b_.Hold(k, rows, count);
+    b_.Hold(k, rows, rhs, count);
   }
   void HoldBody(int k) {
     RowPart<T> rows[3];
@@ -414,7 +447,8 @@ class Equations {
       for (int i = 0; i < 3; ++i) rows[r][i] = T(r == i ? 1.0 : 0.0);
     }
     b_.Begin();
-    b_.Hold(k, rows, 3);
+    const T rhs[3] = {T(0.0), T(0.0), T(0.0)};
+    b_.Hold(k, rows, rhs, 3);
   }
 
   void ServoDamper(const ServoIndex& servo, double target_rate) {

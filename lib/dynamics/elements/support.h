@@ -29,6 +29,7 @@
 // a force and a damper across it. At the solution v_i = v̂_i, so that the damper gives nothing but
 // the derivative. A point that does not slide is held by two rows, a body at rest by three.
 
+#include <cmath>
 #include <vector>
 
 #include "tangible/dynamics/elements/joint.h"
@@ -42,6 +43,20 @@ void DiscFriction(const T& radius, const T twist[3], T friction[3]);
 
 /// Of a disc with μ N = 1 at a twist that is not 0: Ψ'' as Σ weight rowᵀ row over three rows.
 void DiscDampers(double radius, const double twist[3], double rows[3][3], double weights[3]);
+
+/// The velocity of a point at an arm from the centre of mass, at a twist.
+template <typename T, typename U>
+Vector2<T> VelocityAtArm(const Vector2<T>& arm, const U twist[3]) {
+  return Vector2<T>(twist[0] - twist[2] * arm.y(), twist[1] + twist[2] * arm.x());
+}
+
+/// The speed of the same; 0 at rest, without derivatives.
+template <typename T, typename U>
+T SpeedAtArm(const Vector2<T>& arm, const U twist[3]) {
+  using std::sqrt;
+  const T square = VelocityAtArm(arm, twist).squaredNorm();
+  return ValueOf(square) > 0.0 ? T(sqrt(square)) : T(0.0);
+}
 
 /// A point on which a body stands: its arm from the centre of mass, in the world's directions, m,
 /// and μ N_i, N, or μ N_i h, N s.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/dynamics/jacobian/contact_gradient.h"
 
+#include "tangible/dynamics/elements/support.h"
 #include "tangible/dynamics/jacobian/local_entries_inl.h"
 
 namespace tangible {
@@ -92,7 +93,85 @@ class GradientVisitor : private internal::LocalEntries<EntryListSink> {
     sink_(0, s_.ParameterVariable(servo.Number(ServoIndex::kLimit)), 1.0);
   }
 
+  void SupportProgress(int k, const SupportState& at) {
+    const SupportIndex& support = s_.supports[k];
+    if (support.kind == SupportIndex::kDisc) {
+      Locals locals;
+      const LocalJet radius = LocalNumber(support.numbers + SupportIndex::kRadius, &locals);
+      LocalJet twist[3];
+      LocalTwist(support.body, &locals, twist);
+      const LocalJet turn = radius * radius * twist[2] * at.twist[2];
+      return Emit(locals, 0, twist[0] * at.twist[0] + twist[1] * at.twist[1] + turn);
+    }
+    for (int i = 0; i < support.num_points; ++i) {
+      if (!at.IsSlow(i)) continue;
+      Locals locals;
+      const Vector2<LocalJet> arm = LocalArm(support, i, &locals);
+      LocalJet twist[3];
+      LocalTwist(support.body, &locals, twist);
+      Emit(locals, 0, VelocityAtArm(arm, twist).dot(VelocityAtArm(arm, at.twist.data())));
+    }
+  }
+
+  void SupportReserve(int k, int holds, const SupportState& at, const double* wrench,
+                      double by_wrench[3]) {
+    const SupportIndex& support = s_.supports[k];
+    const double* u = at.twist.data();
+    std::copy_n(u, 3, by_wrench);
+    if (support.kind == SupportIndex::kDisc) {
+      Locals locals;
+      const LocalJet limit = LocalLimit(support, &locals);
+      const LocalJet radius = LocalNumber(support.numbers + SupportIndex::kRadius, &locals);
+      const LocalJet twist[3] = {LocalJet(u[0]), LocalJet(u[1]), LocalJet(u[2])};
+      LocalJet friction[3];
+      DiscFriction(radius, twist, friction);
+      return Emit(locals, 0,
+                  -limit * (friction[0] * u[0] + friction[1] * u[1] + friction[2] * u[2]));
+    }
+    for (int i = 0; i < support.num_points; ++i) {
+      if (holds >= 0 && holds != i) continue;
+      Locals locals;
+      const Vector2<LocalJet> arm = LocalArm(support, i, &locals);
+      LocalJet limit = LocalLimit(support, &locals);
+      if (support.kind == SupportIndex::kPoints) {
+        limit *= LocalNumber(support.Point(i) + 2, &locals);
+      }
+      LocalJet left = limit * SpeedAtArm(arm, u);
+      if (holds == i) {
+        const Vector2<LocalJet> velocity = VelocityAtArm(arm, u);
+        for (int r = 0; r < 2; ++r) {
+          left += wrench[r] * velocity[r];
+          by_wrench[r] = velocity[r].a;
+        }
+        by_wrench[2] = 0.0;
+      }
+      Emit(locals, 0, left);
+    }
+  }
+
  private:
+  LocalJet LocalLimit(const SupportIndex& support, Locals* locals) {
+    return LocalNumber(support.numbers + SupportIndex::kFriction, locals) *
+           LocalNumber(support.numbers + SupportIndex::kLoad, locals);
+  }
+
+  // The arm of a point of a support.
+  Vector2<LocalJet> LocalArm(const SupportIndex& support, int point, Locals* locals) {
+    if (support.kind != SupportIndex::kPoints) {
+      return Vector2<LocalJet>(LocalJet(0.0), LocalJet(0.0));
+    }
+    const Pose<LocalJet> pose = LocalPose(support.body, locals);
+    const LocalJet x = LocalNumber(support.Point(point), locals);
+    const LocalJet y = LocalNumber(support.Point(point) + 1, locals);
+    return pose.rotation * Vector2<LocalJet>(x, y);
+  }
+
+  void LocalTwist(int body, Locals* locals, LocalJet twist[3]) {
+    for (int i = 0; i < 3; ++i) {
+      twist[i] = locals->Add(state_.twist[3 * body + i], s_.TwistVariable(body, i));
+    }
+  }
+
   void EvaluateServo(const ServoIndex& servo, Locals* locals, ServoRows<LocalJet>* out) {
     if (servo.joint < 0) {
       const ForceIndex& force = s_.forces[servo.force];
@@ -156,6 +235,21 @@ void AddServoGradient(const Model<double>& model, const State<double>& state, in
                       std::vector<JacobianEntry>* entries) {
   const EntryListSink sink{entries};
   GradientVisitor(model, state, scratch, sink).Servo(servo, sign, time, middle);
+}
+
+void AddSupportProgressGradient(const Model<double>& model, const State<double>& state, int k,
+                                const SupportState& at, LocalJacobianScratch* scratch,
+                                std::vector<JacobianEntry>* entries) {
+  const EntryListSink sink{entries};
+  GradientVisitor(model, state, scratch, sink).SupportProgress(k, at);
+}
+
+void AddSupportReserveGradient(const Model<double>& model, const State<double>& state, int k,
+                               int holds, const SupportState& at, const double* wrench,
+                               LocalJacobianScratch* scratch, double by_wrench[3],
+                               std::vector<JacobianEntry>* entries) {
+  const EntryListSink sink{entries};
+  GradientVisitor(model, state, scratch, sink).SupportReserve(k, holds, at, wrench, by_wrench);
 }
 
 }  // namespace tangible

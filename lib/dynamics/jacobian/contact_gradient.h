@@ -2,7 +2,7 @@
 #pragma once
 //
 // Gradients of the functions whose roots are events: a contact's gap, its sliding speed t v, the
-// speed n v at which it opens, and what is left to a servo's bound.
+// speed n v at which it opens, what is left to a servo's bound, and those of supports.
 
 #include "tangible/dynamics/jacobian/equation_jacobian.h"
 
@@ -26,5 +26,19 @@ void AddApproachGradient(const Model<double>& model, const State<double>& state,
 void AddServoGradient(const Model<double>& model, const State<double>& state, int servo,
                       double sign, double time, double middle, LocalJacobianScratch* scratch,
                       std::vector<JacobianEntry>* entries);
+
+/// The same for the progress of a body, or of its point, that slows down on support k, whose last
+/// motion is `at` (simulation/events/support_bounds.h).
+void AddSupportProgressGradient(const Model<double>& model, const State<double>& state, int k,
+                                const SupportState& at, LocalJacobianScratch* scratch,
+                                std::vector<JacobianEntry>* entries);
+
+/// The same for what is left of what support k can hold, W, at given forces of its rows; the
+/// derivatives by these are written to by_wrench[3]. `at`: the motion that begins; `holds`: the
+/// body or its point.
+void AddSupportReserveGradient(const Model<double>& model, const State<double>& state, int k,
+                               int holds, const SupportState& at, const double* wrench,
+                               LocalJacobianScratch* scratch, double by_wrench[3],
+                               std::vector<JacobianEntry>* entries);
 
 }  // namespace tangible

@@ -138,6 +138,12 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
     EmitMomentum(locals_, a, row_a, b, row_b, -amount);
   }
 
+  void Dampen(int body, const RowPart<LocalJet>& row, const LocalJet& damping) {
+    const RowPart<LocalJet> none{LocalJet(0.0), LocalJet(0.0), LocalJet(0.0)};
+    const LocalJet speed = RowTimes(unknown_, body, row, s_.world(), none);
+    EmitMomentum(locals_, body, row, s_.world(), none, damping * speed);
+  }
+
   void AddForce(int body, const LocalJet value[3]) {
     for (int i = 0; i < 3; ++i) {
       Emit(locals_, BodyRow(s_, body) + i, -value[i]);
@@ -187,8 +193,8 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
 
   void BeginShare(int k) { share_ = k; }
 
-  void Hold(int k, const RowPart<LocalJet>* rows, int count) {
-    this->EmitHeld(locals_, k, rows, count, unknown_, *solved_.solution);
+  void Hold(int k, const RowPart<LocalJet>* rows, const LocalJet* rhs, int count) {
+    this->EmitHeld(locals_, k, {rows, rhs, count}, unknown_, *solved_.solution);
   }
 
   void Contact(int i, const ActiveContact& contact, const ContactRows<LocalJet>& rows,

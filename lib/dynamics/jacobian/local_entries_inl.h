@@ -65,16 +65,21 @@ class LocalEntries {
   }
 
   /// The rows by which a support holds its body, at the motion of all bodies.
-  void EmitHeld(const Locals& locals, int support, const RowPart<LocalJet>* rows, int count,
-                const double* motion, const ContactSolution<double>& solution) {
+  struct HeldRows {
+    const RowPart<LocalJet>* rows;
+    const LocalJet* rhs;
+    int count;
+  };
+  void EmitHeld(const Locals& locals, int support, const HeldRows& held, const double* motion,
+                const ContactSolution<double>& solution) {
     const int body = s_.supports[support].body;
     const int joint = static_cast<int>(s_.joints.size()) + support;
     const RowPart<LocalJet> none{LocalJet(0.0), LocalJet(0.0), LocalJet(0.0)};
-    for (int r = 0; r < count; ++r) {
-      LocalJet speed(0.0);
-      for (int i = 0; i < 3; ++i) speed += rows[r][i] * motion[3 * body + i];
+    for (int r = 0; r < held.count; ++r) {
+      LocalJet speed = -held.rhs[r];
+      for (int i = 0; i < 3; ++i) speed += held.rows[r][i] * motion[3 * body + i];
       Emit(locals, JointRow(joint) + r, speed);
-      EmitMomentum(locals, body, rows[r], s_.world(), none,
+      EmitMomentum(locals, body, held.rows[r], s_.world(), none,
                    -solution.joint_impulse[3 * static_cast<size_t>(joint) + r]);
     }
   }

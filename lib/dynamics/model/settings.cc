@@ -40,9 +40,6 @@ bool CheckSettings(const Scene& scene, std::string* error) {
   const auto joint = decays_in(scene.joints);
   const auto body = decays_in(scene.bodies);
   const auto pair = decays_in(scene.pairs);
-  const auto support =
-      std::find_if(scene.bodies.begin(), scene.bodies.end(),
-                   [](const BasicBody<double>& item) { return item.support.has_value(); });
   if (fixed && IntegratorOf(settings) != Integrator::kSemiImplicitEuler) {
     *error = NeedsEvents("integrator", "semi_implicit_euler", "others need",
                          NameOf(IntegratorOf(settings), kIntegratorNames));
@@ -53,10 +50,6 @@ bool CheckSettings(const Scene& scene, std::string* error) {
   } else if (fixed && settings.impact_law != ImpactLaw::kNewton) {
     *error = NeedsEvents("impact_law", "newton", "other needs",
                          NameOf(settings.impact_law, kImpactLawNames));
-  } else if (!fixed && support != scene.bodies.end()) {
-    *error = "/bodies/" + std::to_string(support - scene.bodies.begin()) +
-             "/support: expected none with event stepping (friction on the plane of motion needs "
-             "\"stepping\": \"fixed\"), got one";
   } else if (fixed && joint != scene.joints.end()) {
     refuse("/joints/" + std::to_string(joint - scene.joints.begin()), *joint->kinetic_friction);
   } else if (fixed && body != scene.bodies.end()) {

@@ -14,8 +14,14 @@ namespace tangible {
 struct SupportState {
   enum Holds : int { kNothing = -2, kBody = -1 };  ///< from 0 on: the point that is held
   int holds = kNothing;
+  /// In a motion between events: what moves so slowly that its velocity does not tell the direction
+  /// of its friction; the twist below does.
+  int slow = kNothing;
+  /// While that twist is sought, the twist of the accelerations: friction is linearised about it.
+  bool is_sought = false;
   /// The twist of the body about which the friction of the points that slide is linearised.
   std::array<double, 3> twist{};
+  bool IsSlow(int point) const { return slow == kBody || slow == point; }
   friend bool operator==(const SupportState&, const SupportState&) = default;
 };
 

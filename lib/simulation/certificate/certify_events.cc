@@ -14,6 +14,7 @@
 #include "tangible/simulation/certificate/certify_place_inl.h"
 #include "tangible/simulation/certificate/feature_ties.h"
 #include "tangible/simulation/certificate/split_error.h"
+#include "tangible/simulation/certificate/support_slacks.h"
 #include "tangible/simulation/certificate/tolerances.h"
 #include "tangible/simulation/derivatives/rollout_directional.h"
 #include "tangible/simulation/derivatives/tolerances.h"
@@ -234,6 +235,14 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
     }
     AddFriction(friction, place);
   }
+  ForEachHeldSupport(model, *segment, [&](const SupportSlack& slack) {
+    // What lets go at once is located as an event.
+    const bool goes_at_once = segment->length == 0.0 && segment->event_index == slack.support &&
+                              segment->event == EventKind::kSupportLetsGo;
+    if (motion_follows || goes_at_once) return;
+    AddMargin(slack.margin, {&s, step, segment->time, 0, &slack.contact, ContactMode::kOpen},
+              "sticking");
+  });
   if (segment->starts && segment->length == 0.0) {
     start_ = segment;
   } else if (segment->length > 0.0) {

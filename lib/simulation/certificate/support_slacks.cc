@@ -7,6 +7,34 @@
 
 namespace tangible {
 
+namespace {
+
+SupportSlack SlackOf(const ModelStructure& structure, size_t support) {
+  SupportSlack slack;
+  slack.support = static_cast<int>(support);
+  slack.contact.a = structure.supports[support].body;
+  slack.contact.b = structure.world();
+  slack.contact.is_support = true;
+  return slack;
+}
+
+// Of a body that is held as a whole, by the forces of its rows.
+void SetReserve(const SupportFriction& friction, const double* held, SupportSlack* slack) {
+  const double wrench[3] = {-held[0], -held[1], -held[2]};
+  slack->margin = friction.Reserve(wrench);
+  slack->slack = HUGE_VAL;
+}
+
+// Of one of its points.
+void SetPointReserve(const SupportPoint& point, const double* held, SupportSlack* slack) {
+  slack->slides = false;
+  slack->slack = point.limit - std::hypot(held[0], held[1]);
+  slack->scale = point.limit;
+  slack->margin = slack->slack / slack->scale;
+}
+
+}  // namespace
+
 void ForEachSupportSlack(const Model<double>& model, const StepRecord& record,
                          const std::function<void(const SupportSlack&)>& visit) {
   const ModelStructure& s = *model.structure;
@@ -19,15 +47,9 @@ void ForEachSupportSlack(const Model<double>& model, const StepRecord& record,
     if (!(friction.limit() > 0.0)) continue;
     const double mass = model.parameters[s.bodies[support.body].mass];
     const double* held = &record.solution.joint_impulse[3 * (s.joints.size() + k)];
-    SupportSlack slack;
-    slack.support = static_cast<int>(k);
-    slack.contact.a = support.body;
-    slack.contact.b = s.world();
-    slack.contact.is_support = true;
+    SupportSlack slack = SlackOf(s, k);
     if (at.holds == SupportState::kBody) {
-      const double wrench[3] = {-held[0], -held[1], -held[2]};
-      slack.margin = friction.Reserve(wrench);
-      slack.slack = HUGE_VAL;
+      SetReserve(friction, held, &slack);
       visit(slack);
       continue;
     }
@@ -47,10 +69,7 @@ void ForEachSupportSlack(const Model<double>& model, const StepRecord& record,
       const SupportPoint& point = friction.points()[i];
       slack.point = static_cast<int>(i);
       if (slack.point == at.holds) {
-        slack.slides = false;
-        slack.slack = point.limit - std::hypot(held[0], held[1]);
-        slack.scale = point.limit;
-        slack.margin = slack.slack / slack.scale;
+        SetPointReserve(point, held, &slack);
         visit(slack);
         continue;
       }
@@ -58,6 +77,26 @@ void ForEachSupportSlack(const Model<double>& model, const StepRecord& record,
       point.VelocityAt(twist, velocity);
       slides(std::hypot(velocity[0], velocity[1]), point.limit);
     }
+  }
+}
+
+void ForEachHeldSupport(const Model<double>& model, const Segment& segment,
+                        const std::function<void(const SupportSlack&)>& visit) {
+  const ModelStructure& s = *model.structure;
+  SupportFriction friction;
+  for (size_t k = 0; k < segment.before.supports.size(); ++k) {
+    const int holds = segment.before.supports[k].holds;
+    if (holds == SupportState::kNothing) continue;
+    friction.Set(model, segment.before, s.supports[k], 1.0);
+    const double* held = &segment.stages[0].solution.joint_impulse[3 * (s.joints.size() + k)];
+    SupportSlack slack = SlackOf(s, k);
+    if (holds == SupportState::kBody) {
+      SetReserve(friction, held, &slack);
+    } else {
+      slack.point = holds;
+      SetPointReserve(friction.points()[static_cast<size_t>(holds)], held, &slack);
+    }
+    visit(slack);
   }
 }
 

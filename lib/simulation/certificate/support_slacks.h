@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// How far the supports of a fixed step are from holding more, or less: the modes of supports are
-// choices of the step, as those of contacts are.
+// How far the supports of a fixed step, or of a motion between events, are from holding more, or
+// less: the modes of supports are choices of the step, as those of contacts are.
 
 #include <functional>
 
@@ -25,5 +25,10 @@ struct SupportSlack {
 /// function, and only its margin is known, to a factor of 2.
 void ForEachSupportSlack(const Model<double>& model, const StepRecord& record,
                          const std::function<void(const SupportSlack&)>& visit);
+
+/// What the supports of a motion between events hold at its start, with forces in the place of
+/// impulses. What slides comes to rest at an event.
+void ForEachHeldSupport(const Model<double>& model, const Segment& segment,
+                        const std::function<void(const SupportSlack&)>& visit);
 
 }  // namespace tangible

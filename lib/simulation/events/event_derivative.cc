@@ -180,6 +180,12 @@ double EventDerivative::EventGradient(const Model<double>& model, Segment* segme
   } else if (segment->event == EventKind::kServoBound) {
     AddServoGradient(model, segment->after, segment->event_index, segment->event_sign,
                      segment->time + segment->length, segment->middle, &scratch_, &entries);
+  } else if (segment->event == EventKind::kSupportStops) {
+    AddSupportProgressGradient(model, segment->after, segment->event_index,
+                               segment->before.supports[static_cast<size_t>(segment->event_index)],
+                               &scratch_, &entries);
+  } else if (segment->event == EventKind::kSupportLetsGo) {
+    residual = AddLetsGoGradient(model, segment, gradient, &entries);
   } else {
     // Lift-off has g = λn; slip begins at g = Σ (μ λn − sign λt) over contacts that stick together.
     SolvedNode& node = segment->end;
@@ -211,6 +217,29 @@ double EventDerivative::EventGradient(const Model<double>& model, Segment* segme
   for (const JacobianEntry& entry : entries) {
     (*gradient)(entry.variable) += entry.value;
   }
+  return residual;
+}
+
+// Of what is left of what a support can hold, by the forces of its rows.
+double EventDerivative::AddLetsGoGradient(const Model<double>& model, Segment* segment,
+                                          Eigen::VectorXd* gradient,
+                                          std::vector<JacobianEntry>* entries) {
+  const ModelStructure& s = *model.structure;
+  SolvedNode& node = segment->end;
+  const int k = segment->event_index;
+  const int joint = static_cast<int>(s.joints.size()) + k;
+  double by_wrench[3];
+  AddSupportReserveGradient(
+      model, segment->after, k, segment->before.supports[static_cast<size_t>(k)].holds,
+      segment->event_support, &node.solution.joint_impulse[3 * static_cast<size_t>(joint)],
+      &scratch_, by_wrench, entries);
+  RowMatrixXd seed = RowMatrixXd::Zero(3 * static_cast<Eigen::Index>(node.system.num_blocks()), 1);
+  for (int r = 0; r < node.problem.joints[static_cast<size_t>(joint)].rows; ++r) {
+    seed(3 * (s.num_blocks() + joint) + r, 0) = by_wrench[r];
+  }
+  RowMatrixXd w_bar = RowMatrixXd::Zero(s.num_variables() + 1, 1);
+  const double residual = NodeAdjoint(model, *segment, &node, false, &seed, &w_bar);
+  *gradient += w_bar.col(0);
   return residual;
 }
 

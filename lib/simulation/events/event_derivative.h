@@ -58,6 +58,8 @@ class EventDerivative {
   void ImpulsesAdjoint(const Model<double>& model, Impulses* impulses, RowMatrixXd* w_bar);
   /// Returns the relative residual of its linear solve.
   double EventGradient(const Model<double>& model, Segment* segment, Eigen::VectorXd* gradient);
+  double AddLetsGoGradient(const Model<double>& model, Segment* segment, Eigen::VectorXd* gradient,
+                           std::vector<JacobianEntry>* entries);
   double NodeTangent(const Model<double>& model, const Segment& segment, SolvedNode* node,
                      bool correction, const RowMatrixXd& x, RowMatrixXd* solved,
                      const Eigen::RowVectorXd* tau_dot = nullptr);

@@ -134,6 +134,7 @@ bool EventStepper::AddInstant(const Model<double>& model, double t, EventKind ki
     return false;
   }
   *state = segment.after;
+  state->supports.clear();
   return true;
 }
 

@@ -10,6 +10,7 @@
 #include "tangible/simulation/events/mode_elimination_inl.h"
 #include "tangible/simulation/events/segment_flow.h"
 #include "tangible/simulation/events/solve_jets_inl.h"
+#include "tangible/simulation/events/support_bounds.h"
 #include "tangible/simulation/events/tolerances.h"
 
 namespace tangible {
@@ -38,6 +39,7 @@ class EventReplay {
       const State<double>& before = part.is_impulses ? part.impulses.before : part.segment.before;
       state->servo_modes = before.servo_modes;
       state->released = before.released;
+      state->supports = before.supports;
       if (part.is_impulses) {
         RunImpulses(&part.impulses, state);
       } else {
@@ -45,6 +47,7 @@ class EventReplay {
       }
     }
     state->servo_modes.clear();
+    state->supports.clear();
   }
 
  private:
@@ -206,6 +209,18 @@ class EventReplay {
       return limit -
              segment->event_sign * UnboundedEffort(model_, after, k, {time, segment->middle, 0.0});
     }
+    if (segment->event == EventKind::kSupportStops) {
+      const int k = segment->event_index;
+      return SupportProgress(model_, after, k, segment->before.supports[static_cast<size_t>(k)]);
+    }
+    if (segment->event == EventKind::kSupportLetsGo) {
+      const auto k = static_cast<size_t>(segment->event_index);
+      ContactSolution<T> solution;
+      Accelerate(*segment, after, time, &segment->end, &solution);
+      return SupportReserve(model_, after, segment->event_index, segment->before.supports[k].holds,
+                            segment->event_support.twist,
+                            &solution.joint_impulse[3 * (s_.joints.size() + k)]);
+    }
     if (segment->event == EventKind::kLiftOff || segment->event == EventKind::kSlipBegins) {
       ContactSolution<T> solution;
       Accelerate(*segment, after, time, &segment->end, &solution);
@@ -270,7 +285,8 @@ class EventReplay {
   // depend on all.
   static bool ReadsBody(const Segment& segment, int body) {
     return segment.event == EventKind::kLiftOff || segment.event == EventKind::kSlipBegins ||
-           body == segment.event_contact.a || body == segment.event_contact.b;
+           segment.event == EventKind::kSupportLetsGo || body == segment.event_contact.a ||
+           body == segment.event_contact.b;
   }
 
   static std::vector<T> JetsOf(const std::vector<double>& values) {
@@ -282,6 +298,7 @@ class EventReplay {
     jets.twist = JetsOf(state.twist);
     jets.servo_modes = state.servo_modes;
     jets.released = state.released;
+    jets.supports = state.supports;
     return jets;
   }
 

@@ -89,6 +89,10 @@ const char* NameOf(EventKind event) {
       return "lift-off";
     case EventKind::kServoBound:
       return "bound of a servo";
+    case EventKind::kSupportStops:
+      return "rest on a support";
+    case EventKind::kSupportLetsGo:
+      return "start of sliding on a support";
     case EventKind::kReturn:
       return "return into penetration";
     case EventKind::kAtOnce:

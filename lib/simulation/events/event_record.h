@@ -49,15 +49,17 @@ struct Impulses : StepRecord {
 };
 
 enum class EventKind : unsigned char {
-  kStepEnd,     ///< no event: the end of the step
-  kEdge,        ///< a force's window opens or closes, a joint ends, a signal or path has a corner
-  kTouch,       ///< a gap or the distance from a joint limit closes
-  kSlipEnds,    ///< a sliding speed reaches 0
-  kSlipBegins,  ///< friction reaches its limit (Segment::SticksWith)
-  kLiftOff,     ///< a normal force reaches 0
-  kServoBound,  ///< a servo reaches or leaves its bound
-  kReturn,      ///< the speed at which an open contact leaves penetration reaches 0
-  kAtOnce,      ///< the same at the segment's start, where poses and twists are corrected
+  kStepEnd,       ///< no event: the end of the step
+  kEdge,          ///< a force's window opens or closes, a joint ends, a signal or path has a corner
+  kTouch,         ///< a gap or the distance from a joint limit closes
+  kSlipEnds,      ///< a sliding speed reaches 0
+  kSlipBegins,    ///< friction reaches its limit (Segment::SticksWith)
+  kLiftOff,       ///< a normal force reaches 0
+  kServoBound,    ///< a servo reaches or leaves its bound
+  kSupportStops,  ///< a point on its support comes to rest, or all of them
+  kSupportLetsGo,  ///< a support reaches the limit of what it can hold
+  kReturn,         ///< the speed at which an open contact leaves penetration reaches 0
+  kAtOnce,         ///< the same at the segment's start, where poses and twists are corrected
 };
 
 /// "touch", "end of sliding", ...
@@ -103,7 +105,10 @@ struct Segment {
   double event_sign = 0.0;  ///< sign of kSlipBegins' tangential force, of kServoBound's bound
   int event_number = -1;    ///< kEdge: the number that is the time; −1: a constant
   SolvedNode end;           ///< kSlipBegins, kLiftOff: accelerations after the motion
-  int event_index = -1;     ///< the same: which of `contacts`; kServoBound: the servo
+  int event_index = -1;     ///< the same: which of `contacts`; kServoBound: the servo;
+                            ///< kSupportStops, kSupportLetsGo: the support
+  /// kSupportLetsGo: what it then does, with the direction in which the body begins to move.
+  SupportState event_support;
   /// The event's function does not pass through 0 but jumps where poses and twists are corrected at
   /// the start of the segment: the time of the event is that start, whatever varies.
   bool at_once = false;

@@ -517,12 +517,14 @@ bool EventSearch::Run(const Model<double>& model, const std::vector<ActiveContac
   }
   if (event.kind != EventKind::kAtOnce) SearchClosed(model, &event);
   if (event.kind != EventKind::kAtOnce && !event.at_start) SearchServos(model, &event);
+  if (event.kind != EventKind::kAtOnce && !event.at_start) SearchSupports(model, &event);
   ends_at_start_ = event.at_start;
   segment->length = event.length;
   segment->event = event.kind;
   segment->event_contact = event.contact;
   segment->event_index = event.index;
   segment->event_sign = event.sign;
+  segment->event_support = event.support;
   segment->at_once = event.at_once;
   if (event.kind == EventKind::kSlipBegins) {
     segment->event_friction = segment->friction[event.index];
@@ -538,7 +540,8 @@ bool EventSearch::Run(const Model<double>& model, const std::vector<ActiveContac
     FindHandOvers(model, &event);
   }
   TakeMotion(At(model, segment->length), segment);
-  if (event.kind == EventKind::kSlipBegins || event.kind == EventKind::kLiftOff) {
+  if (event.kind == EventKind::kSlipBegins || event.kind == EventKind::kLiftOff ||
+      event.kind == EventKind::kSupportLetsGo) {
     return flow_.Accelerate(model, *segment, segment->after, segment->time + segment->length,
                             &segment->end);
   }

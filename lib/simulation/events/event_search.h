@@ -19,6 +19,7 @@
 #include <utility>
 #include <vector>
 
+#include "tangible/dynamics/elements/support.h"
 #include "tangible/geometry/broad_phase.h"
 #include "tangible/simulation/events/segment_flow.h"
 #include "tangible/simulation/events/tolerances.h"
@@ -100,6 +101,7 @@ class EventSearch {
     ActiveContact contact;
     int index = -1;
     double sign = 0.0;
+    SupportState support{};  ///< of kSupportLetsGo
     bool at_once = false;
     bool at_start = false;
   };
@@ -129,6 +131,12 @@ class EventSearch {
   void SearchClosed(const Model<double>& model, Event* event);
   void SearchServos(const Model<double>& model, Event* event);  ///< servo_bounds.cc
   void SearchServo(const Model<double>& model, int servo, double sign, Event* event);
+  void SearchSupports(const Model<double>& model, Event* event);  ///< support_bounds.cc
+  void SearchStop(const Model<double>& model, int support, Event* event);
+  void SearchLetsGo(const Model<double>& model, int support, Event* event);
+  const double* HeldAt(const Model<double>& model, int support, Sample* sample);
+  SupportState LetsGoAt(const Model<double>& model, const State<double>& state, int support,
+                        const double* held);
   double SlipRate(const Model<double>& model, const State<double>& state, double time,
                   const std::vector<double>& accelerations, const Event& event) const;
   double FindDip(const Model<double>& model, const Event& event, double a, double fa, double b,
@@ -168,6 +176,7 @@ class EventSearch {
   std::vector<Aabb> boxes_;
   std::vector<double> reach_;  ///< by which the boxes over the segment are grown, m
   BroadPhase broad_phase_;
+  SupportFriction support_;
   std::string message_;
 };
 

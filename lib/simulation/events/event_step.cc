@@ -424,23 +424,11 @@ bool EventStepper::Releases(const Model<double>& model, const Segment& segment) 
   return true;
 }
 
-bool EventStepper::ChooseModes(const Model<double>& model, const State<double>& state,
-                               StepReport* outcome, Segment* segment) {
+bool EventStepper::ChooseContactModes(const Model<double>& model, double slow,
+                                      std::vector<double> slip, StepReport* outcome,
+                                      Segment* segment) {
   const SimulationSettings& settings = model.structure->settings;
-  const double slow = SlowSpeed(model, state);
-  segment->contacts.clear();
-  segment->friction.clear();
-  segment->modes.clear();
-  std::vector<double> slip;
-  for (size_t i = 0; i < touching_.contacts.size(); ++i) {
-    bool is_open = touching_.approach[i] > slow;
-    const double counted = SlipAtStart(i, slow, &is_open);
-    if (!is_open && !LacksItsContact(i, segment->contacts)) {
-      segment->contacts.push_back(touching_.contacts[i]);
-      segment->friction.push_back(touching_.friction[i]);
-      slip.push_back(counted);
-    }
-  }
+  const State<double>& state = segment->before;
   if (segment->contacts.empty()) {
     guess_.contacts.clear();
     guess_.modes.clear();
@@ -656,6 +644,7 @@ Segment& EventStepper::BeginSegment(double now, double until, const State<double
 bool EventStepper::TakeEvent(const Model<double>& model, double now, double h,
                              const Segment& segment, State<double>* state, StepReport* outcome) {
   SwitchMode(segment);
+  supports_.TakeEvent(segment);
   if (segment.event != EventKind::kTouch || segment.length <= kNoMotion * h) {
     ++outcome->events;
     if (counts_.Add(segment.event_contact) > MostEvents(model)) {
@@ -706,6 +695,9 @@ EventStepper::Tried EventStepper::TryMotion(const Model<double>& model, double n
     return Tried::kAgain;
   }
   if (!outcome->message.empty()) return Tried::kFailed;
+  if (supports_.HasToStop(model, *segment)) {
+    return StopSupports(model, *segment, parts, state, outcome) ? Tried::kAgain : Tried::kFailed;
+  }
   if (!model.structure->servos.empty()) HoldServos(model, &flow_, segment);
   std::string message;
   bool moved = search_.Run(model, touching_.contacts, segment, &message);
@@ -741,6 +733,7 @@ StepReport EventStepper::Advance(const Model<double>& model, double t, double h,
   counts_.Clear();
   shortened_.Clear();
   search_.StartStep(model, t, h, *state);
+  supports_.StartStep(*model.structure, t);
   AddEdgesAtStart(model, t, *state, &outcome);
   SetReleased(model, JustAfter(model, t), state);
   const std::vector<Edge> edges = EdgesWithin(model, t, t + h);
@@ -776,6 +769,8 @@ StepReport EventStepper::Advance(const Model<double>& model, double t, double h,
     if (outcome.stopped) break;
     *state = segment.after;
     state->servo_modes.clear();
+    state->supports.clear();
+    supports_.Moved();
     at_given_time = segment.event == EventKind::kStepEnd;
     tries.halvings = 0;
     if (at_given_time) {

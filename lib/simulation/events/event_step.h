@@ -29,6 +29,7 @@
 #include "tangible/simulation/events/event_search.h"
 #include "tangible/simulation/events/impact_groups.h"
 #include "tangible/simulation/events/step_report.h"
+#include "tangible/simulation/events/support_modes.h"
 
 namespace tangible {
 
@@ -162,6 +163,12 @@ class EventStepper {
                   ContactSolution<double>* solution) const;
   bool ChooseModes(const Model<double>& model, const State<double>& state, StepReport* outcome,
                    Segment* segment);
+  bool ChooseContactModes(const Model<double>& model, double slow, std::vector<double> slip,
+                          StepReport* outcome, Segment* segment);
+  /// Takes the rest of its speed from what the supports of a motion hold, as a part of the record
+  /// in the place of that motion.
+  bool StopSupports(const Model<double>& model, const Segment& segment, int parts,
+                    State<double>* state, StepReport* outcome);
   /// Shortens a motion to what the contacts of ellipses allow (ellipse_motion.h): to the next
   /// multiple of dt / 2^k. Near states have the same k, so that its end is a given instant and
   /// derivatives are exact.
@@ -235,6 +242,10 @@ class EventStepper {
   Touching touching_;
   std::vector<bool> rebounds_;  ///< of the last impact's contacts
   DecompressionSolver decompression_;
+  SupportModes supports_;
+  SolvedNode start_;  ///< accelerations at the start of a motion, with its supports
+  std::vector<ActiveContact> listed_contacts_;  ///< of it, before their modes are chosen
+  std::vector<CoefficientSource> listed_friction_;
   EventGuess guess_;
   EventCounts counts_;              ///< of this step
   EventCounts shortened_;           ///< motions shortened at ellipses in this step

@@ -79,6 +79,13 @@ class ModeElimination {
     for (int i = 0; i < 3 * p.num_bodies; ++i) {
       out->motion[i] = x[i];
     }
+    out->joint_impulse.assign(3 * p.joints.size(), T(0.0));
+    row = 3 * p.num_bodies;
+    for (size_t j = 0; j < p.joints.size(); ++j) {
+      for (size_t r = 0; r < static_cast<size_t>(p.joints[j].rows); ++r, ++row) {
+        out->joint_impulse[3 * j + r] = x[row];
+      }
+    }
     out->normal_impulse.assign(p.contacts.size(), T(0.0));
     out->tangent_impulse.assign(p.contacts.size(), T(0.0));
     for (size_t i = 0; i < p.contacts.size(); ++i) {

@@ -129,7 +129,10 @@ const NystromTableau& NystromTableau::Of(Integrator integrator) {
 }
 
 std::string NameOfContradicted(const ModelStructure& structure, int joint) {
-  return "joint " + structure.joints[joint].name +
+  const auto joints = static_cast<int>(structure.joints.size());
+  return (joint >= joints ? "the support of body " +
+                                structure.bodies[structure.supports[joint - joints].body].name
+                          : "joint " + structure.joints[joint].name) +
          " contradicts the others: no twist satisfies all";
 }
 
@@ -442,7 +445,11 @@ void SetUpProjection(const Segment& segment, const State<double>& state, Impulse
 
 bool SegmentFlow::ProjectTwists(const Model<double>& model, Segment* segment,
                                 std::string* message) {
-  segment->projects_twists = !segment->contacts.empty() || !model.structure->joints.empty();
+  const std::vector<SupportState>& supports = segment->before.supports;
+  segment->projects_twists =
+      !segment->contacts.empty() || !model.structure->joints.empty() ||
+      std::any_of(supports.begin(), supports.end(),
+                  [](const SupportState& one) { return one.holds != SupportState::kNothing; });
   if (!segment->projects_twists) {
     return true;
   }

@@ -136,6 +136,13 @@ void SolveImplicitly(const ContactProblem<T>& problem, const ContactProblem<doub
   for (size_t i = 0; i < solution.motion.size(); ++i) {
     out->motion[i] = jet(solution.motion[i], i);
   }
+  out->joint_impulse.assign(3 * problem.joints.size(), T(0.0));
+  for (size_t j = 0; j < problem.joints.size(); ++j) {
+    for (size_t r = 0; r < static_cast<size_t>(problem.joints[j].rows); ++r) {
+      const size_t row = 3 * (static_cast<size_t>(problem.num_bodies) + j) + r;
+      out->joint_impulse[3 * j + r] = jet(solution.joint_impulse[3 * j + r], row);
+    }
+  }
   out->normal_impulse.assign(problem.contacts.size(), T(0.0));
   out->tangent_impulse.assign(problem.contacts.size(), T(0.0));
   for (size_t i = 0; i < problem.contacts.size(); ++i) {

@@ -167,4 +167,30 @@ inline constexpr double kLocatedDerivative = 1e-12;
 /// of magnitude above the error of a solve.
 inline constexpr double kDegenerateTolerance = 1e-10;
 
+/// Of μ N: friction of a support that differs by less from that of the new twist has settled; it is
+/// some hundred roundings, so that derivatives at the linearised one are right to the same.
+inline constexpr double kSupportSettled = 1e-13;
+/// Of the speed that its friction takes from a body in a step: a point of a support that is slower
+/// has no direction, and any friction within its limit is that of a point at rest.
+inline constexpr double kStandingPoint = 1e-12;
+/// Of the speed that its friction takes from a body in a time step: a point that slides no faster
+/// and slows down is stopped along its direction, which no longer changes; what that neglects is
+/// this share of a time step long.
+inline constexpr double kSlowSupport = 1e-6;
+/// Of the same: a body that its support lets go moves in the direction of its acceleration up to
+/// this speed, below which its friction would turn its direction much faster than a time step.
+inline constexpr double kStartingSupport = 0.05;
+/// Cosine: within this angle of its acceleration a slow body counts as starting.
+inline constexpr double kStartingAlong = 0.99;
+/// Of dt: the first motion of a body that its support lets go.
+inline constexpr double kFirstOfSupport = 1e-3;
+/// A motion changes the velocity of a point on a support by no more than this share; the error of a
+/// motion of fourth order is some 1e-9 of the way to rest.
+inline constexpr double kSupportTurn = 1.0 / 32.0;
+/// Times the rate at which friction turns a velocity into the direction of its point's motion: a
+/// motion is no longer, by which one of fourth order is stable and its error as small as above.
+inline constexpr double kSupportDecay = 0.5;
+/// Of the wrench that a support balances: its limit is located to it.
+inline constexpr double kSupportLocated = 1e-13;
+
 }  // namespace tangible

@@ -453,13 +453,13 @@ ContactSolverReport Stepper::SolveWithSupports(const Model<double>& model,
                                                StepReport* report) {
   if (model.structure->supports.empty()) return SolveWithContacts(model, state, h, report);
   StepRecord& r = record_;
-  supports_.Start(model, h, r.problem, &r.before);
+  supports_.Start(model, h, r.problem, {}, &r.before);
   for (;;) {
     AssembleWithoutContacts(model, r.before, r.time, h, &r.problem, &scratch_);
     ContactSolverReport solved = SolveWithContacts(model, state, h, report);
     if (!solved.solved && !supports_.has_given_up() && supports_.Release(&r.before)) continue;
     if (!solved.solved) return solved;
-    if (supports_.Accept(model, r, &r.before)) {
+    if (supports_.Accept(model, r.problem, r.solution, &r.before)) {
       SupportIteration::KeepAtRest(*model.structure, &r);
       return solved;
     }

@@ -26,7 +26,7 @@
 #include "tangible/simulation/islands/island_jets.h"
 #include "tangible/simulation/islands/island_step.h"
 #include "tangible/simulation/stepping/joint_projection.h"
-#include "tangible/simulation/stepping/support_iteration.h"
+#include "tangible/simulation/events/support_iteration.h"
 
 namespace tangible {
 

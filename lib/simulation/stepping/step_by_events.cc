@@ -60,8 +60,11 @@ CoefficientSource InWhole(const IslandRecord& island, CoefficientSource source) 
 void AddImpulses(const IslandRecord& island, const NystromTableau& tableau, StepRecord* record) {
   StepRecord& r = *record;
   const size_t first = r.contacts.size();
+  // The rows of supports come after those of joints.
+  const size_t joints =
+      island.part ? island.part->joints.size() : r.solution.joint_impulse.size() / 3;
   const auto add_joints = [&](double weight, const std::vector<double>& impulses) {
-    for (size_t k = 0; k < impulses.size(); ++k) {
+    for (size_t k = 0; k < std::min(3 * joints, impulses.size()); ++k) {
       const size_t joint = island.JointInWhole(static_cast<int>(k / 3));
       r.solution.joint_impulse[3 * joint + k % 3] += weight * impulses[k];
     }

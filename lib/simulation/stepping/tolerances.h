@@ -45,11 +45,4 @@ inline constexpr double kCoupledBeyond = 1e-5;
 /// Of the coordinates of a box: rounding, added to the above.
 inline constexpr double kCoupledRounding = 16.0 * std::numeric_limits<double>::epsilon();
 
-/// Of μ N: friction of a support that differs by less from that of the new twist has settled; it is
-/// some hundred roundings, so that derivatives at the linearised one are right to the same.
-inline constexpr double kSupportSettled = 1e-13;
-/// Of the speed that its friction takes from a body in a step: a point of a support that is slower
-/// has no direction, and any friction within its limit is that of a point at rest.
-inline constexpr double kStandingPoint = 1e-12;
-
 }  // namespace tangible

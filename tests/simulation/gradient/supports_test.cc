@@ -241,16 +241,5 @@ TEST(SupportsTest, AgainstAWall) {
   }
 }
 
-TEST(SupportsTest, NeedFixedSteps) {
-  Scene scene = Table(kSlides, 0.01, 0.1);
-  scene.simulation.stepping = Stepping::kEvent;
-  const GradientResult result =
-      testing::JacobianOf(scene, {"bodies/b/mass"}, GradientMethod::kTangent);
-  EXPECT_FALSE(result.done);
-  EXPECT_NE(result.message.find("/bodies/0/support: expected none with event stepping"),
-            std::string::npos)
-      << result.message;
-}
-
 }  // namespace
 }  // namespace tangible

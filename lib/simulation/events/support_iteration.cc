@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tangible/simulation/stepping/support_iteration.h"
+#include "tangible/simulation/events/support_iteration.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "tangible/simulation/stepping/tolerances.h"
+#include "tangible/simulation/events/tolerances.h"
 
 namespace tangible {
 namespace {
@@ -23,7 +23,8 @@ void LinearisedFriction(const double about[2], const double velocity[2], double 
 }  // namespace
 
 void SupportIteration::Start(const Model<double>& model, double h,
-                             const ContactProblem<double>& problem, State<double>* before) {
+                             const ContactProblem<double>& problem,
+                             const std::vector<char>& are_at_rest, State<double>* before) {
   const ModelStructure& s = *model.structure;
   h_ = h;
   iterations_ = 0;
@@ -31,7 +32,9 @@ void SupportIteration::Start(const Model<double>& model, double h,
   before->supports.resize(s.supports.size());
   residuals_.resize(s.supports.size());
   turns_.assign(s.supports.size(), 0);
+  at_rest_ = are_at_rest;
   for (size_t k = 0; k < s.supports.size(); ++k) {
+    if (!at_rest_.empty() && at_rest_[k] == 0) continue;
     const size_t row = 3 * static_cast<size_t>(s.bodies[s.supports[k].body].block);
     friction_.Set(model, *before, s.supports[k], h);
     before->supports[k] = friction_.SolveAlone(&problem.mass[row], &problem.load[row]);
@@ -185,17 +188,17 @@ bool SupportIteration::Release(State<double>* before) {
   return any;
 }
 
-bool SupportIteration::Accept(const Model<double>& model, const StepRecord& record,
-                              State<double>* before) {
+bool SupportIteration::Accept(const Model<double>& model, const ContactProblem<double>& problem,
+                              const ContactSolution<double>& solution, State<double>* before) {
   const ModelStructure& s = *model.structure;
   const double last = residual_;
   const auto visit = [&](const auto& of_support) {
     for (size_t k = 0; k < s.supports.size(); ++k) {
-      const int body = s.supports[k].body;
+      if (!at_rest_.empty() && at_rest_[k] == 0) continue;
+      const size_t row = 3 * static_cast<size_t>(s.bodies[s.supports[k].body].block);
       friction_.Set(model, *before, s.supports[k], h_);
-      of_support(k, &record.problem.mass[3 * static_cast<size_t>(s.bodies[body].block)],
-                 &record.new_twist[3 * static_cast<size_t>(body)],
-                 &record.solution.joint_impulse[3 * (s.joints.size() + k)]);
+      of_support(k, &problem.mass[row], &solution.motion[row],
+                 &solution.joint_impulse[3 * (s.joints.size() + k)]);
     }
   };
   residual_ = 0.0;

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// The supports of a fixed step (dynamics/elements/support.h): the contact problem of a step has
+// The supports of a fixed step, or of bodies that a motion between events finds at rest
+// (dynamics/elements/support.h): the contact problem of a step, or of accelerations, has
 // their friction linearised about a twist û and the points that they hold as rows, and is solved
 // again until
 //
@@ -25,11 +26,14 @@ namespace tangible {
 class SupportIteration {
  public:
   /// Chooses what the supports do in a step of length h. `problem` has been assembled without them.
+  /// `are_at_rest`: empty, or which supports count; of accelerations (h = 1) those of bodies at
+  /// rest, whose accelerations stand for the new twists.
   void Start(const Model<double>& model, double h, const ContactProblem<double>& problem,
-             State<double>* before);
+             const std::vector<char>& are_at_rest, State<double>* before);
   /// Whether the friction of a solved step is that of its new twists, to the tolerance of the LCP;
   /// if it is not, linearises it anew in `before`, which is the state of the record.
-  bool Accept(const Model<double>& model, const StepRecord& record, State<double>* before);
+  bool Accept(const Model<double>& model, const ContactProblem<double>& problem,
+              const ContactSolution<double>& solution, State<double>* before);
 
   /// Sets the twists of what an accepted step holds at rest to 0: the solve leaves their rounding.
   static void KeepAtRest(const ModelStructure& structure, StepRecord* record);
@@ -57,6 +61,7 @@ class SupportIteration {
   int worst_body_ = -1;
   SupportFriction friction_;
   std::vector<double> residuals_;
+  std::vector<char> at_rest_;
   std::vector<int> turns_;  ///< how often each support has turned round in this step
 };
 

@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The modes of a motion: of its contacts, and of its supports, whose friction and the contacts'
+// forces determine each other.
+#include <algorithm>
+#include <utility>
+
+#include "tangible/simulation/events/event_step.h"
+#include "tangible/simulation/events/tolerances.h"
+
+namespace tangible {
+
+bool EventStepper::ChooseModes(const Model<double>& model, const State<double>& state,
+                               StepReport* outcome, Segment* segment) {
+  const double slow = SlowSpeed(model, state);
+  segment->contacts.clear();
+  segment->friction.clear();
+  segment->modes.clear();
+  std::vector<double> slip;
+  for (size_t i = 0; i < touching_.contacts.size(); ++i) {
+    bool is_open = touching_.approach[i] > slow;
+    const double counted = SlipAtStart(i, slow, &is_open);
+    if (!is_open && !LacksItsContact(i, segment->contacts)) {
+      segment->contacts.push_back(touching_.contacts[i]);
+      segment->friction.push_back(touching_.friction[i]);
+      slip.push_back(counted);
+    }
+  }
+  if (model.structure->supports.empty()) {
+    return ChooseContactModes(model, slow, std::move(slip), outcome, segment);
+  }
+  listed_contacts_ = segment->contacts;
+  listed_friction_ = segment->friction;
+  supports_.Begin(model, slow, segment);
+  for (;;) {
+    if (!ChooseContactModes(model, slow, slip, outcome, segment)) return false;
+    const bool solved = flow_.Accelerate(model, *segment, segment->before, segment->time, &start_);
+    if (solved && supports_.Accept(model, start_.problem, start_.solution, segment)) break;
+    if (!solved || supports_.has_given_up()) {
+      outcome->message = "accelerations";
+      if (supports_.unsettled() >= 0) {
+        const SupportIndex& support = model.structure->supports[supports_.unsettled()];
+        outcome->message += ": the friction of the support of body " +
+                            model.structure->bodies[support.body].name + " does not settle";
+      }
+      return false;
+    }
+    segment->contacts = listed_contacts_;
+    segment->friction = listed_friction_;
+    segment->modes.clear();
+  }
+  supports_.Shorten(model, start_.solution.motion, segment);
+  return true;
+}
+
+// What a support holds has no speed, not even the rounding that an event leaves.
+bool EventStepper::StopSupports(const Model<double>& model, const Segment& segment, int parts,
+                                State<double>* state, StepReport* outcome) {
+  const ModelStructure& s = *model.structure;
+  Segment held;
+  held.time = segment.time;
+  held.middle = segment.middle;
+  held.contacts = segment.contacts;
+  held.friction = segment.friction;
+  held.modes = segment.modes;
+  const std::vector<SupportState> supports = segment.before.supports;
+  record_.num_parts = parts;
+  EventPart* part = record_.Add();
+  part->is_impulses = true;
+  Impulses& stop = part->impulses;
+  SetUpProjection(held, *state, &stop);
+  stop.before.supports = supports;
+  if (!flow_.Project(model, &stop)) {
+    outcome->message = "twists of bodies that come to rest on their supports";
+    return false;
+  }
+  SpreadTwists(s, stop.solution.motion, &state->twist);
+  for (size_t k = 0; k < s.supports.size(); ++k) {
+    const bool centre = s.supports[k].kind == SupportIndex::kCentre;
+    const int held_rows = supports[k].holds == SupportState::kBody ? 3
+                          : supports[k].holds >= 0 && centre       ? 2
+                                                                   : 0;
+    std::fill_n(state->twist.begin() + 3 * s.supports[k].body, held_rows, 0.0);
+  }
+  stop.new_twist = state->twist;
+  supports_.Stopped();
+  return true;
+}
+
+}  // namespace tangible

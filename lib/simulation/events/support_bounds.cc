@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/simulation/events/support_bounds.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "tangible/dynamics/elements/support_inl.h"
+#include "tangible/simulation/events/event_search.h"
+#include "tangible/simulation/events/event_search_inl.h"
+#include "tangible/simulation/events/tolerances.h"
+
+namespace tangible {
+namespace {
+
+// How often the motion that a support lets begin is sought anew.
+constexpr int kMostDirectionsSought = 12;
+
+template <typename T>
+Vector2<T> ArmOfPoint(const Model<T>& model, const State<T>& state, const SupportIndex& support,
+                      int point) {
+  if (support.kind != SupportIndex::kPoints) return Vector2<T>(T(0.0), T(0.0));
+  const T* at = &model.parameters[support.Point(point)];
+  return state.PoseOf(support.body).rotation * Vector2<T>(at[0], at[1]);
+}
+
+}  // namespace
+
+template <typename T>
+T SupportProgress(const Model<T>& model, const State<T>& state, int k, const SupportState& at) {
+  const SupportIndex& support = model.structure->supports[k];
+  const T* twist = &state.twist[3 * static_cast<size_t>(support.body)];
+  if (support.kind == SupportIndex::kDisc) {
+    const T& radius = model.parameters[support.numbers + SupportIndex::kRadius];
+    return twist[0] * at.twist[0] + twist[1] * at.twist[1] +
+           radius * radius * twist[2] * at.twist[2];
+  }
+  T progress(0.0);
+  for (int i = 0; i < support.num_points; ++i) {
+    if (!at.IsSlow(i)) continue;
+    const Vector2<T> arm = ArmOfPoint(model, state, support, i);
+    progress += VelocityAtArm(arm, twist).dot(VelocityAtArm(arm, at.twist.data()));
+  }
+  return progress;
+}
+
+template <typename T>
+T SupportReserve(const Model<T>& model, const State<T>& state, int k, int holds,
+                 const std::array<double, 3>& u, const T* wrench) {
+  const SupportIndex& support = model.structure->supports[k];
+  const T* x = &model.parameters[support.numbers];
+  const T limit = x[SupportIndex::kFriction] * x[SupportIndex::kLoad];
+  if (support.kind == SupportIndex::kDisc) {
+    const T twist[3] = {T(u[0]), T(u[1]), T(u[2])};
+    T friction[3];
+    DiscFriction(x[SupportIndex::kRadius], twist, friction);
+    T left(0.0);
+    for (int i = 0; i < 3; ++i) left += (wrench[i] - limit * friction[i]) * u[i];
+    return left;
+  }
+  T left(0.0);
+  for (int i = 0; i < support.num_points; ++i) {
+    if (holds >= 0 && holds != i) continue;
+    const Vector2<T> arm = ArmOfPoint(model, state, support, i);
+    const T share =
+        support.kind == SupportIndex::kPoints ? model.parameters[support.Point(i) + 2] : T(1.0);
+    left += limit * share * SpeedAtArm(arm, u.data());
+    if (holds != i) continue;
+    const Vector2<T> velocity = VelocityAtArm(arm, u.data());
+    left += wrench[0] * velocity.x() + wrench[1] * velocity.y();
+  }
+  if (holds == SupportState::kBody) {
+    for (int i = 0; i < 3; ++i) left += wrench[i] * u[i];
+  }
+  return left;
+}
+
+ActiveContact ContactOfSupport(const ModelStructure& structure, int support) {
+  ActiveContact contact;
+  contact.is_support = true;
+  contact.a = structure.supports[support].body;
+  contact.b = structure.world();
+  return contact;
+}
+
+void EventSearch::SearchSupports(const Model<double>& model, Event* event) {
+  const std::vector<SupportState>& supports = segment_->before.supports;
+  for (int k = 0; k < static_cast<int>(supports.size()); ++k) {
+    if (supports[k].slow != SupportState::kNothing) SearchStop(model, k, event);
+    if (supports[k].holds != SupportState::kNothing) SearchLetsGo(model, k, event);
+  }
+}
+
+// Searches for the time at which what slows down on a support comes to rest.
+void EventSearch::SearchStop(const Model<double>& model, int support, Event* event) {
+  const SupportState& at = segment_->before.supports[support];
+  const auto value_of = [&](const Sample& sample) {
+    if (!sample.good) return std::numeric_limits<double>::quiet_NaN();
+    return SupportProgress(model, sample.motion.after, support, at);
+  };
+  double fa = SupportProgress(model, segment_->before, support, at);
+  if (!(fa > 0.0)) return;
+  const double tolerance = kLocatedOfSize * fa;
+  Event trial;
+  trial.kind = EventKind::kSupportStops;
+  trial.contact = ContactOfSupport(*model.structure, support);
+  trial.index = support;
+  const double whole = event->length;
+  double a = 0.0;
+  for (const double share : {0.5, 1.0}) {
+    const double b = share * whole;
+    const double fb = value_of(*At(model, b));
+    if (std::isnan(fb)) return;
+    if (fb <= tolerance) {
+      trial.length = fb < -tolerance ? Refine(model, value_of, tolerance, a, fa, b, fb) : b;
+      *event = trial;
+      return;
+    }
+    a = b;
+    fa = fb;
+  }
+}
+
+// The forces of a support's rows at the end of a motion; null where there is none.
+const double* EventSearch::HeldAt(const Model<double>& model, int support, Sample* sample) {
+  if (!sample->good) return nullptr;
+  const Segment& motion = sample->motion;
+  if (!sample->has_end) {
+    if (!flow_.Accelerate(model, motion, motion.after, motion.time + motion.length, &sample->end)) {
+      return nullptr;
+    }
+    sample->has_end = true;
+  }
+  const size_t row = model.structure->joints.size() + static_cast<size_t>(support);
+  return &sample->end.solution.joint_impulse[3 * row];
+}
+
+// What a support does where its rows would need these forces, if it cannot give them; `slow` tells.
+SupportState EventSearch::LetsGoAt(const Model<double>& model, const State<double>& state,
+                                   int support, const double* held) {
+  const SupportIndex& index = model.structure->supports[support];
+  const int holds = segment_->before.supports[support].holds;
+  SupportState next;
+  support_.Set(model, state, index, 1.0);
+  if (holds == SupportState::kBody) {
+    const double wrench[3] = {-held[0], -held[1], -held[2]};
+    if (support_.CanHold(wrench)) return next;
+    const double arm = support_.arm();
+    const double unit[3] = {1.0, 1.0, arm > 0.0 ? arm * arm : 1.0};
+    next = support_.SolveAlone(unit, wrench);
+    next.slow = SupportState::kBody;
+    return next;
+  }
+  const double size = std::hypot(held[0], held[1]);
+  if (!(size > support_.points()[static_cast<size_t>(holds)].limit)) return next;
+  next.slow = holds;
+  next.twist = {-held[0] / size, -held[1] / size, 0.0};
+  return next;
+}
+
+// Searches for the time at which a support can no longer hold what it holds.
+void EventSearch::SearchLetsGo(const Model<double>& model, int support, Event* event) {
+  const int holds = segment_->before.supports[support].holds;
+  SupportState next;
+  const auto value_of = [&](Sample& sample) {
+    const double* held = HeldAt(model, support, &sample);
+    if (held == nullptr) return std::numeric_limits<double>::quiet_NaN();
+    return SupportReserve(model, sample.motion.after, support, holds, next.twist, held);
+  };
+  double a = 0.0;
+  for (const double share : {0.5, 1.0}) {
+    double b = share * event->length;
+    const double* held = HeldAt(model, support, At(model, b));
+    if (held == nullptr) return;
+    SupportState beyond = LetsGoAt(model, At(model, b)->motion.after, support, held);
+    if (beyond.slow == SupportState::kNothing) {
+      a = b;
+      continue;
+    }
+    Event trial;
+    trial.kind = EventKind::kSupportLetsGo;
+    trial.contact = ContactOfSupport(*model.structure, support);
+    trial.index = support;
+    for (int i = 0; i < kMostDirectionsSought; ++i) {
+      next = beyond;
+      trial.support = next;
+      const double fb = value_of(*At(model, b));
+      const double fa = value_of(*At(model, a));
+      if (std::isnan(fa) || std::isnan(fb)) return;
+      const double tolerance =
+          kSupportLocated *
+          (std::abs(fb) + support_.limit() * std::hypot(next.twist[0], next.twist[1],
+                                                        support_.arm() * next.twist[2]));
+      trial.length = fa <= tolerance    ? a
+                     : fb >= -tolerance ? b
+                                        : Refine(model, value_of, tolerance, a, fa, b, fb);
+      if (trial.length >= b || trial.length <= a) break;
+      b = trial.length;
+      const Sample* at_root = At(model, b);
+      beyond =
+          LetsGoAt(model, at_root->motion.after, support, HeldAt(model, support, At(model, b)));
+      if (beyond.slow == SupportState::kNothing) break;
+    }
+    *event = trial;
+    return;
+  }
+}
+
+#define TANGIBLE_INSTANTIATE(T)                                                              \
+  template T SupportProgress<T>(const Model<T>&, const State<T>&, int, const SupportState&); \
+  template T SupportReserve<T>(const Model<T>&, const State<T>&, int, int,                   \
+                               const std::array<double, 3>&, const T*);
+#define TANGIBLE_INSTANTIATE_JET(N) TANGIBLE_INSTANTIATE(Jet<N>)
+TANGIBLE_INSTANTIATE(double)
+TANGIBLE_FOR_EACH_JET_WIDTH(TANGIBLE_INSTANTIATE_JET)
+
+}  // namespace tangible

@@ -1,0 +1,389 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/simulation/events/support_modes.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "tangible/simulation/events/tolerances.h"
+
+namespace tangible {
+namespace {
+
+// Motions at supports end at multiples of dt / 2^k with k up to this.
+constexpr int kMostSupportHalvings = 30;
+// Of the spacing of such multiples: the rounding of a time.
+constexpr double kGridSlack = 1e-3;
+
+// The speed of a part of a support at a twist: of all of it, as a body, or of a point, m/s.
+double SpeedOfPart(const SupportFriction& friction, int part, const double twist[3]) {
+  if (friction.is_disc()) return std::hypot(twist[0], twist[1], friction.arm() * twist[2]);
+  double speed = 0.0;
+  for (size_t i = 0; i < friction.points().size(); ++i) {
+    if (part != SupportState::kBody && part != static_cast<int>(i)) continue;
+    double v[2];
+    friction.points()[i].VelocityAt(twist, v);
+    speed = std::max(speed, std::hypot(v[0], v[1]));
+  }
+  return speed;
+}
+
+// The acceleration of a point on a body, m/s².
+void AccelerationOf(const SupportPoint& point, const double acceleration[3], double turn,
+                    double out[2]) {
+  point.VelocityAt(acceleration, out);
+  for (int i = 0; i < 2; ++i) out[i] -= turn * turn * point.arm[i];
+}
+
+// The product of the motions of all of a support at two twists, over its points.
+double ProductOf(const SupportFriction& friction, const double u[3], const double w[3]) {
+  if (friction.is_disc()) {
+    return u[0] * w[0] + u[1] * w[1] + friction.arm() * friction.arm() * u[2] * w[2];
+  }
+  double product = 0.0;
+  for (const SupportPoint& point : friction.points()) {
+    double v[2], x[2];
+    point.VelocityAt(u, v);
+    point.VelocityAt(w, x);
+    product += v[0] * x[0] + v[1] * x[1];
+  }
+  return product;
+}
+
+// How fast a part of a support gains speed along its motion, m²/s³.
+double GainOfPart(const SupportFriction& friction, int part, const double twist[3],
+                  const double acceleration[3]) {
+  if (friction.is_disc()) {
+    const double arm = friction.arm();
+    return twist[0] * acceleration[0] + twist[1] * acceleration[1] +
+           arm * arm * twist[2] * acceleration[2];
+  }
+  double gain = 0.0;
+  for (size_t i = 0; i < friction.points().size(); ++i) {
+    if (part != SupportState::kBody && part != static_cast<int>(i)) continue;
+    double v[2], a[2];
+    friction.points()[i].VelocityAt(twist, v);
+    AccelerationOf(friction.points()[i], acceleration, twist[2], a);
+    gain += v[0] * a[0] + v[1] * a[1];
+  }
+  return gain;
+}
+
+const double* NumbersOfBlock(const Model<double>& model, int k, const std::vector<double>& values) {
+  const ModelStructure& s = *model.structure;
+  return &values[3 * static_cast<size_t>(s.bodies[s.supports[k].body].block)];
+}
+
+}  // namespace
+
+void SupportModes::StartStep(const ModelStructure& structure, double t) {
+  start_ = t;
+  dt_ = structure.settings.dt;
+  rested_.clear();
+  let_go_.assign(structure.supports.size(), SupportState());
+}
+
+void SupportModes::TakeEvent(const Segment& segment) {
+  if (segment.event == EventKind::kSupportStops) {
+    rested_.push_back({segment.event_index,
+                       segment.before.supports[static_cast<size_t>(segment.event_index)].slow});
+  } else if (segment.event == EventKind::kSupportLetsGo) {
+    let_go_[static_cast<size_t>(segment.event_index)] = segment.event_support;
+  }
+}
+
+void SupportModes::Moved() {
+  rested_.clear();
+  for (SupportState& one : let_go_) one.slow = SupportState::kNothing;
+}
+
+SupportModes::Course SupportModes::CourseOf(const Model<double>& model, int k, double slow,
+                                            const Segment& segment, SupportState* at) {
+  const SupportIndex& support = model.structure->supports[k];
+  *at = SupportState();
+  if (!(friction_.limit() > 0.0)) return Course::kFree;
+  if (let_go_[k].slow != SupportState::kNothing) {
+    *at = let_go_[k];
+    return Course::kReleased;
+  }
+  const double* twist = &segment.before.twist[3 * static_cast<size_t>(support.body)];
+  const double unit =
+      friction_.limit() / model.parameters[model.structure->bodies[support.body].mass];
+  const double stops = std::max(slow, kSlowSupport * unit * dt_);
+  const auto rests = [&](int part) {
+    const bool found = std::any_of(rested_.begin(), rested_.end(), [&](const Rested& one) {
+      return one.support == k && (one.part == part || one.part == SupportState::kBody);
+    });
+    return SpeedOfPart(friction_, part, twist) <= (found ? 2.0 * stops : slow);
+  };
+  const double speed = SpeedOfPart(friction_, SupportState::kBody, twist);
+  const int whole =
+      support.kind == SupportIndex::kCentre ? 0 : static_cast<int>(SupportState::kBody);
+  if (rests(whole)) return Course::kRests;
+  std::copy_n(twist, 3, at->twist.begin());
+  for (int i = 0; support.kind == SupportIndex::kPoints && i < support.num_points; ++i) {
+    if (rests(i)) at->holds = i;
+  }
+  if (speed <= stops) {
+    at->slow = SupportState::kBody;
+    return Course::kStops;
+  }
+  if (at->holds != SupportState::kNothing) return Course::kTurns;
+  // Whether it starts, its acceleration from rest tells.
+  if (speed <= kStartingSupport * unit * dt_) return Course::kStarts;
+  return CourseOfPoints(support, stops, kStartingSupport * unit * dt_, at);
+}
+
+// Of a body that is not at rest and does not start: whether one of its points is slow.
+SupportModes::Course SupportModes::CourseOfPoints(const SupportIndex& support, double stops,
+                                                  double starts, SupportState* at) {
+  for (int i = 0; support.kind == SupportIndex::kPoints && i < support.num_points; ++i) {
+    const double speed = SpeedOfPart(friction_, i, at->twist.data());
+    if (speed > std::max(stops, starts)) continue;
+    at->slow = i;
+    return speed <= stops ? Course::kStops : Course::kPasses;
+  }
+  return Course::kSlides;
+}
+
+void SupportModes::Begin(const Model<double>& model, double slow, Segment* segment) {
+  const ModelStructure& s = *model.structure;
+  State<double>& before = segment->before;
+  before.supports.assign(s.supports.size(), SupportState());
+  courses_.assign(s.supports.size(), Course::kFree);
+  at_rest_.assign(s.supports.size(), 0);
+  turned_.assign(s.supports.size(), 0);
+  changes_ = 0;
+  unsettled_ = -1;
+  started_ = false;
+  for (int k = 0; k < static_cast<int>(s.supports.size()); ++k) {
+    friction_.Set(model, before, s.supports[k], 1.0);
+    SupportState& at = before.supports[k];
+    courses_[k] = CourseOf(model, k, slow, *segment, &at);
+    if (courses_[k] == Course::kRests || courses_[k] == Course::kStarts) Seek(k, &at);
+  }
+}
+
+// The friction of a body at rest is sought; at first it has none.
+void SupportModes::Seek(int k, SupportState* at) {
+  at_rest_[k] = 1;
+  started_ = false;
+  *at = SupportState();
+  at->slow = SupportState::kBody;
+  at->is_sought = true;
+}
+
+bool SupportModes::Accept(const Model<double>& model, const ContactProblem<double>& problem,
+                          const ContactSolution<double>& solution, Segment* segment) {
+  const ModelStructure& s = *model.structure;
+  State<double>& before = segment->before;
+  ++changes_;
+  bool accepted = true;
+  const auto sought = std::count(at_rest_.begin(), at_rest_.end(), 1);
+  for (int k = 0; k < static_cast<int>(s.supports.size()); ++k) {
+    if (AcceptOne(model, k, solution, segment)) continue;
+    accepted = false;
+    unsettled_ = k;
+  }
+  if (std::count(at_rest_.begin(), at_rest_.end(), 1) != sought) return false;
+  if (sought == 0) return accepted;
+  bool settled = false;
+  if (!std::exchange(started_, true)) {
+    // Everything but the supports, with the impulses of contacts and joints, is in M a.
+    pushed_.mass = problem.mass;
+    pushed_.load.resize(problem.load.size());
+    for (size_t i = 0; i < pushed_.load.size(); ++i) {
+      pushed_.load[i] = problem.mass[i] * solution.motion[i];
+    }
+    iteration_.Start(model, 1.0, pushed_, at_rest_, &before);
+  } else {
+    settled = iteration_.Accept(model, problem, solution, &before);
+  }
+  for (int k = 0; k < static_cast<int>(s.supports.size()); ++k) {
+    if (at_rest_[k] == 0) continue;
+    SupportState& at = before.supports[k];
+    at.slow = SupportState::kBody;
+    // A body that starts keeps the derivative of its direction.
+    at.is_sought = true;
+    if (!settled) unsettled_ = k;
+    if (!settled || courses_[k] != Course::kStarts) continue;
+    // A body that is slow, but does not move along the acceleration that it would have at rest,
+    // comes to rest or turns.
+    const double* twist = &before.twist[3 * static_cast<size_t>(s.supports[k].body)];
+    friction_.Set(model, before, s.supports[k], 1.0);
+    const double* goes = at.twist.data();
+    const double along = ProductOf(friction_, twist, goes);
+    const double sizes =
+        std::sqrt(ProductOf(friction_, twist, twist) * ProductOf(friction_, goes, goes));
+    if (at.holds == SupportState::kNothing && along >= kStartingAlong * sizes && sizes > 0.0) {
+      continue;
+    }
+    const SupportIndex& support = s.supports[k];
+    const double unit =
+        friction_.limit() / model.parameters[model.structure->bodies[support.body].mass] * dt_;
+    at = SupportState();
+    std::copy_n(twist, 3, at.twist.begin());
+    courses_[k] = CourseOfPoints(support, kSlowSupport * unit, kStartingSupport * unit, &at);
+    at_rest_[k] = 0;
+    accepted = false;
+    started_ = false;
+  }
+  return accepted && settled;
+}
+
+// Of a point at rest on a body that turns: whether friction holds it, or else the direction in
+// which it starts.
+bool SupportModes::AcceptPoint(int point, const double acceleration[3], double turn,
+                               const double* held, int* changes, SupportState* at) const {
+  constexpr double kSettledDirection = 1e-13;
+  constexpr int kMostDirections = 40;
+  const SupportPoint& of = friction_.points()[static_cast<size_t>(point)];
+  double way[2];
+  if (at->holds == point) {
+    const double size = std::hypot(held[0], held[1]);
+    if (size <= (1.0 + kForceTolerance) * of.limit) return true;
+    for (int i = 0; i < 2; ++i) way[i] = -held[i] / size;
+    at->holds = SupportState::kNothing;
+    at->slow = point;
+  } else {
+    double of_point[2];
+    AccelerationOf(of, acceleration, turn, of_point);
+    const double size = std::hypot(of_point[0], of_point[1]);
+    if (!(size > 0.0) || *changes > kMostDirections) return true;
+    for (int i = 0; i < 2; ++i) way[i] = of_point[i] / size;
+    if (std::hypot(way[0] - at->twist[0], way[1] - at->twist[1]) <= kSettledDirection) return true;
+  }
+  ++*changes;
+  at->twist = {way[0], way[1], 0.0};
+  return false;
+}
+
+bool SupportModes::AcceptOne(const Model<double>& model, int k,
+                             const ContactSolution<double>& solution, Segment* segment) {
+  const ModelStructure& s = *model.structure;
+  const Course course = courses_[k];
+  if (course != Course::kStops && course != Course::kTurns && course != Course::kPasses) {
+    return true;
+  }
+  SupportState& at = segment->before.supports[k];
+  const double* acceleration = NumbersOfBlock(model, k, solution.motion);
+  const double* twist = &segment->before.twist[3 * static_cast<size_t>(s.supports[k].body)];
+  friction_.Set(model, segment->before, s.supports[k], 1.0);
+  if (course == Course::kTurns) {
+    const int point = at.holds >= 0 ? at.holds : at.slow;
+    return AcceptPoint(point, acceleration, twist[2],
+                       &solution.joint_impulse[3 * (s.joints.size() + static_cast<size_t>(k))],
+                       &turned_[k], &at);
+  }
+  const double gain = GainOfPart(friction_, at.slow, twist, acceleration);
+  if (course == Course::kStops) {
+    if (gain < 0.0) return true;
+    // It does not slow down: it has begun to move, or only passes a low speed.
+    courses_[k] = at.slow == SupportState::kBody ? Course::kStarts : Course::kPasses;
+    if (at.slow == SupportState::kBody) Seek(k, &at);
+    return false;
+  }
+  const int point = at.slow;
+  double of_point[2];
+  AccelerationOf(friction_.points()[static_cast<size_t>(point)], acceleration, twist[2], of_point);
+  const double along = SpeedOfPart(friction_, point, twist) * std::hypot(of_point[0], of_point[1]);
+  if (gain > kStartingAlong * along) {
+    return AcceptPoint(point, acceleration, twist[2], nullptr, &turned_[k], &at);
+  }
+  at = SupportState();
+  courses_[k] = Course::kSlides;
+  return false;
+}
+
+bool SupportModes::HasToStop(const Model<double>& model, const Segment& segment) const {
+  const ModelStructure& s = *model.structure;
+  for (size_t k = 0; k < s.supports.size(); ++k) {
+    const SupportState& at = segment.before.supports[k];
+    if (at.holds == SupportState::kNothing) continue;
+    if (courses_[k] == Course::kReleased) continue;
+    const double* twist = &segment.before.twist[3 * static_cast<size_t>(s.supports[k].body)];
+    if (at.holds == SupportState::kBody) {
+      if (twist[0] != 0.0 || twist[1] != 0.0 || twist[2] != 0.0) return true;
+    } else if (s.supports[k].kind == SupportIndex::kCentre) {
+      if (twist[0] != 0.0 || twist[1] != 0.0) return true;
+    } else if (std::any_of(rested_.begin(), rested_.end(),
+                           [&](const Rested& one) { return one.support == static_cast<int>(k); })) {
+      return true;
+    }
+  }
+  return false;
+}
+
+// The longest motion that a support allows, s.
+double SupportModes::LongestOf(const Model<double>& model, int k, const double acceleration[3],
+                               const Segment& segment) {
+  const ModelStructure& s = *model.structure;
+  const SupportIndex& support = s.supports[k];
+  const BodyIndex& body = s.bodies[support.body];
+  const SupportState& at = segment.before.supports[k];
+  const double* twist = &segment.before.twist[3 * static_cast<size_t>(support.body)];
+  const bool is_held =
+      at.holds == SupportState::kBody || (support.kind == SupportIndex::kCentre && at.holds == 0);
+  if (courses_[k] == Course::kFree || is_held) return HUGE_VAL;
+  friction_.Set(model, segment.before, support, 1.0);
+  const double speed = SpeedOfPart(friction_, SupportState::kBody, twist);
+  const double size = SpeedOfPart(friction_, SupportState::kBody, acceleration);
+  if (at.slow == SupportState::kBody) {
+    const double least = kFirstOfSupport * dt_;
+    if (courses_[k] == Course::kStops) return size > 0.0 ? 4.0 * speed / size : least;
+    return size > 0.0 ? std::max(least, speed / size) : least;
+  }
+  const double mass = model.parameters[body.mass];
+  const double inertia = model.parameters[body.inertia];
+  double longest = HUGE_VAL;
+  const auto limit = [&](double v, double a, double weight, double arm) {
+    const double decay = weight * (1.0 / mass + arm * arm / inertia);
+    longest = std::min(longest, v / std::max(a / kSupportTurn, decay / kSupportDecay));
+  };
+  if (friction_.is_disc()) {
+    limit(speed, size, friction_.limit(), friction_.arm());
+    return longest;
+  }
+  for (size_t i = 0; i < friction_.points().size(); ++i) {
+    const SupportPoint& point = friction_.points()[i];
+    if (static_cast<int>(i) == at.holds) continue;
+    double v[2], a[2];
+    point.VelocityAt(twist, v);
+    AccelerationOf(point, acceleration, twist[2], a);
+    if (static_cast<int>(i) == at.slow) {
+      const double change = std::hypot(a[0], a[1]);
+      const double least = kFirstOfSupport * dt_;
+      const double share = change > 0.0 ? std::hypot(v[0], v[1]) / change : 0.0;
+      longest =
+          std::min(longest, courses_[k] == Course::kStops && change > 0.0 ? 4.0 * share
+                                                                          : std::max(least, share));
+      continue;
+    }
+    limit(std::hypot(v[0], v[1]), std::hypot(a[0], a[1]), point.limit,
+          std::hypot(point.arm[0], point.arm[1]));
+  }
+  return longest;
+}
+
+void SupportModes::Shorten(const Model<double>& model, const std::vector<double>& accelerations,
+                           Segment* segment) {
+  double longest = HUGE_VAL;
+  for (int k = 0; k < static_cast<int>(model.structure->supports.size()); ++k) {
+    longest =
+        std::min(longest, LongestOf(model, k, NumbersOfBlock(model, k, accelerations), *segment));
+  }
+  if (!(segment->length > longest)) return;
+  double spacing = dt_;
+  for (int k = 1; k <= kMostSupportHalvings && spacing > longest; ++k) {
+    spacing = std::ldexp(dt_, -k);
+  }
+  // The slack is that of the time's rounding.
+  const double since = (segment->time - start_) / spacing;
+  const double next = start_ + (std::floor(since + kGridSlack) + 1.0) * spacing;
+  const double length = next - segment->time;
+  if (!(length > 0.0) || length >= segment->length - kGridSlack * spacing) return;
+  segment->length = length;
+  segment->middle = segment->time + 0.5 * length;
+}
+
+}  // namespace tangible

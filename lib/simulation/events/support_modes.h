@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// What the supports do in a motion between events (dynamics/elements/support.h). A point that
+// slides has friction against its velocity. As it comes to rest that direction turns ever faster:
+// motions become shorter with its speed, and the last of them, whose speed is next to nothing, has
+// the direction of its start, so that the speed along it passes through 0 at an instant
+// (support_bounds.h). Then
+//
+//   a body whose points all rest   stays, or starts in the direction of its acceleration: the
+//                                  problem of a step, of accelerations in the place of twists
+//   a body that turns about a      keeps it while |f_i| ≤ μ N_i; otherwise the point starts in the
+//   point that rests               direction of its acceleration
+//
+// A body that starts has that direction for its friction as long as it is slow: friction would
+// align its velocity with it within a time that is short beside dt.
+
+#include <vector>
+
+#include "tangible/simulation/events/segment_flow.h"
+#include "tangible/simulation/events/support_iteration.h"
+
+namespace tangible {
+
+class SupportModes {
+ public:
+  /// A step begins at t.
+  void StartStep(const ModelStructure& structure, double t);
+  /// What the event that ended the last motion has found: support k comes to rest, or lets go.
+  void TakeEvent(const Segment& segment);
+  /// The last motion has been made.
+  void Moved();
+  /// The twists of what is held are those of rest.
+  void Stopped() { rested_.clear(); }
+
+  /// Sets what the supports do in a motion from segment->before, by their speeds there. Speeds up
+  /// to `slow` count as 0, m/s.
+  void Begin(const Model<double>& model, double slow, Segment* segment);
+  /// Whether that is consistent with the accelerations at the start, which were solved with it; if
+  /// it is not, changes it in segment->before.
+  bool Accept(const Model<double>& model, const ContactProblem<double>& problem,
+              const ContactSolution<double>& solution, Segment* segment);
+  bool has_given_up() const { return changes_ > kMostChanges || iteration_.has_given_up(); }
+  /// Which support has not been accepted.
+  int unsettled() const { return unsettled_; }
+
+  /// Whether a body that is held in the motion, or its point, still has a speed at its start that
+  /// must be taken from it.
+  bool HasToStop(const Model<double>& model, const Segment& segment) const;
+  /// Shortens the motion to what its supports allow, to a multiple of dt / 2^k since the start of
+  /// the step: near states have the same k, so that its end is a given instant and derivatives are
+  /// exact. `accelerations`: those at its start, three for each moving body.
+  void Shorten(const Model<double>& model, const std::vector<double>& accelerations,
+               Segment* segment);
+
+ private:
+  static constexpr int kMostChanges = 60;
+
+  /// What a support does, and why.
+  enum class Course : char {
+    kFree,      ///< it has no friction
+    kSlides,    ///< by its velocities
+    kStops,     ///< a part of it is slow, and slows down
+    kStarts,    ///< the body is slow, and begins to move
+    kRests,     ///< the body is at rest: it stays, or begins to move
+    kTurns,     ///< a point is at rest
+    kPasses,    ///< a point is slow, and begins to move or only passes a low speed
+    kReleased,  ///< an event has let go what was held
+  };
+  struct Rested {
+    int support = -1;
+    int part = SupportState::kNothing;  ///< SupportState::kBody, or the point
+  };
+  Course CourseOf(const Model<double>& model, int k, double slow, const Segment& segment,
+                  SupportState* at);
+  Course CourseOfPoints(const SupportIndex& support, double stops, double starts, SupportState* at);
+  bool AcceptOne(const Model<double>& model, int k, const ContactSolution<double>& solution,
+                 Segment* segment);
+  bool AcceptPoint(int point, const double acceleration[3], double turn, const double* held,
+                   int* changes, SupportState* at) const;
+  void Seek(int k, SupportState* at);
+  double LongestOf(const Model<double>& model, int k, const double acceleration[3],
+                   const Segment& segment);
+
+  double start_ = 0.0;  ///< of the step
+  double dt_ = 0.0;
+  int changes_ = 0;
+  int unsettled_ = -1;
+  bool started_ = false;  ///< the iteration of bodies at rest
+  std::vector<Course> courses_;
+  std::vector<char> at_rest_;
+  std::vector<int> turned_;  ///< how often the direction of a support has been changed
+  std::vector<Rested> rested_;
+  std::vector<SupportState> let_go_;  ///< by support; `slow` is kNothing: it is not let go
+  ContactProblem<double> pushed_;     ///< masses and what pushes bodies that are at rest
+  SupportFriction friction_;
+  SupportIteration iteration_;
+};
+
+}  // namespace tangible

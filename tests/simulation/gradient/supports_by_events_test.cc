@@ -1,0 +1,286 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Bodies on a table seen from above, by events: rest and start at instants, against closed forms
+// and an integrator of its own.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "../../support/gradients.h"
+#include "../../support/scenes.h"
+#include "tangible/dynamics/elements/support.h"
+#include "tangible/simulation/stepping/rollout.h"
+
+namespace tangible {
+namespace {
+
+using test_scenes::SceneOf;
+using testing::ExpectOthersAgree;
+using testing::Jacobian;
+
+constexpr double kStandardG = 9.81;
+
+// One body "b" of 2 kg with these keys, and what the scene has beside it.
+Scene TableByEvents(const std::string& keys, double dt, double duration,
+                    const std::string& gravity = "0, 0", const std::string& rest = "") {
+  return SceneOf(R"({"gravity": [)" + gravity + R"(], "bodies": [{"name": "b", "mass": 2, )" +
+                 keys + "}" + rest + R"(], "simulation": {"stepping": "event", "dt": )" +
+                 std::to_string(dt) + R"(, "duration": )" + std::to_string(duration) + "}}");
+}
+
+const char kSlidesFreely[] =
+    R"("inertia": 0.1, "position": [0.5, 0.2], "velocity": [0.6, 0.8], "angular_velocity": 3,
+       "support": {"friction": 0.25})";
+
+// v² / (2 μ g) along its direction, then rest to the bit; friction without arm gives no torque.
+TEST(SupportsByEventsTest, ABlockSlidesStraightAndStops) {
+  for (const double dt : {0.01, 0.04}) {
+    const double a = 0.25 * kStandardG;
+    const Scene scene = TableByEvents(kSlidesFreely, dt, 1.0);
+    const std::vector<std::string> paths = {"bodies/b/velocity/x", "bodies/b/support/friction",
+                                            "bodies/b/mass", "bodies/b/angle"};
+    const GradientResult result = Jacobian(scene, paths, GradientMethod::kAdjoint);
+    const double way = 0.5 / a;
+    EXPECT_NEAR(result.values[0], 0.5 + 0.6 * way, 1e-10);
+    EXPECT_NEAR(result.values[1], 0.2 + 0.8 * way, 1e-10);
+    EXPECT_EQ(result.values[3], 0.0);
+    EXPECT_EQ(result.values[4], 0.0);
+    EXPECT_NEAR(result.values[5], 3.0, 1e-14);
+    // Along its direction v / a, across it half of that.
+    EXPECT_NEAR(result.jacobian(0, 0), (0.36 + 0.5 * 0.64) / a, 1e-7);
+    EXPECT_NEAR(result.jacobian(1, 0), (0.48 - 0.5 * 0.48) / a, 1e-7);
+    EXPECT_NEAR(result.jacobian(0, 1), -0.6 * way / 0.25, 1e-8);
+    EXPECT_NEAR(result.jacobian(0, 2), 0.0, 1e-10);  // the load follows the mass
+    EXPECT_NEAR(result.jacobian(3, 0), 0.0, 1e-12);
+    EXPECT_EQ(result.certificate.verdict, "trustworthy");
+    ExpectOthersAgree(scene, paths, result);
+  }
+}
+
+// On a tilted table it stays exactly where gravity is within the cone, and slides beyond.
+TEST(SupportsByEventsTest, ATableThatIsTilted) {
+  const std::string keys =
+      R"("inertia": 0.1, "position": [0.3, 0.1], "support": {"friction": 0.25})";
+  for (const char* support :
+       {"0.25", "0.25, \"radius\": 0.2", "0.25, \"points\": [[1, 0], [0, 1]]"}) {
+    std::string own = keys;
+    own.replace(own.find("0.25"), 4, support);
+    const bool turns = support[4] != '\0' && support[7] == 'p';
+    const Scene below = TableByEvents(own, 0.01, 0.5, turns ? "0.5, -0.5" : "1.4, -2.0");
+    const GradientResult rests = Jacobian(below, {"gravity/x"}, GradientMethod::kTangent);
+    EXPECT_EQ(rests.values[0], 0.3) << support;
+    EXPECT_EQ(rests.values[1], 0.1) << support;
+    EXPECT_EQ(rests.values[2], 0.0) << support;
+    EXPECT_EQ(rests.jacobian.cwiseAbs().maxCoeff(), 0.0);
+  }
+  const Scene above = TableByEvents(keys, 0.01, 1.0, "1.8, -2.4");
+  const std::vector<std::string> paths = {"gravity/x", "gravity/y", "bodies/b/support/friction"};
+  const GradientResult slides = Jacobian(above, paths, GradientMethod::kAdjoint);
+  const double left = 3.0 - 0.25 * kStandardG;
+  EXPECT_NEAR(slides.values[0], 0.3 + 0.6 * left * 0.5, 1e-10);
+  EXPECT_NEAR(slides.values[1], 0.1 - 0.8 * left * 0.5, 1e-10);
+  EXPECT_NEAR(slides.jacobian(0, 0), (0.36 + 0.64 * left / 3.0) * 0.5, 1e-6);
+  EXPECT_NEAR(slides.jacobian(1, 2), 0.8 * kStandardG * 0.5, 1e-8);
+  ExpectOthersAgree(above, paths, slides);
+}
+
+// A force on the body's centre with this signal.
+BasicForce<double> PushBy(std::vector<double> times, std::vector<double> x, std::vector<double> y) {
+  BasicForce<double> push;
+  push.name = "push";
+  push.body = 0;
+  Signal signal;
+  signal.interpolation = Signal::Interpolation::kLinear;
+  signal.time = std::move(times);
+  signal.x = std::move(x);
+  signal.y = std::move(y);
+  push.force_signal = signal;
+  return push;
+}
+
+// A force that grows, c t: from t₀ = μ N / c on the body moves by c (t − t₀)³ / (6 m), in its
+// direction; t₀ lies within a step or on its end.
+TEST(SupportsByEventsTest, AGrowingForceBreaksItLoose) {
+  for (const char* support : {"", R"(, "radius": 0.2)", R"(, "points": [[1, 0], [-1, 0]])"}) {
+    for (const double rate : {11.0, 10.0}) {
+      SCOPED_TRACE(std::string(support) + " " + std::to_string(rate));
+      Scene scene = TableByEvents(std::string(R"("inertia": 0.1, "position": [0, 0],
+          "support": {"friction": 0.25, "load": 20)") +
+                                      support + "}",
+                                  0.01, 1.0);
+      scene.forces.push_back(PushBy({0.0, 1.0}, {0.0, 0.6 * rate}, {0.0, 0.8 * rate}));
+      const std::vector<std::string> paths = {"bodies/b/support/friction", "bodies/b/mass"};
+      const GradientResult result = Jacobian(scene, paths, GradientMethod::kAdjoint);
+      const double since = 1.0 - 5.0 / rate;
+      const double way = rate * since * since * since / 12.0;
+      EXPECT_NEAR(result.values[0], 0.6 * way, 1e-9);
+      EXPECT_NEAR(result.values[1], 0.8 * way, 1e-9);
+      EXPECT_NEAR(result.values[2], 0.0, 1e-12);
+      EXPECT_NEAR(result.jacobian(0, 0), -0.6 * 20.0 * since * since / 4.0, 1e-6);
+      EXPECT_NEAR(result.jacobian(1, 1), -0.8 * way / 2.0, 1e-7);
+      ExpectOthersAgree(scene, paths, result);
+    }
+  }
+}
+
+// A body on a rail that a force pushes back: it stops, rests while friction holds it, and returns.
+TEST(SupportsByEventsTest, ABodyOnARailTurnsRound) {
+  Scene scene = TableByEvents(R"("inertia": 0.1, "position": [0, 0], "velocity": [1, 0],
+      "support": {"friction": 0.25, "load": 20})",
+                              0.01, 1.0);
+  BasicJoint<double> rail;
+  rail.name = "rail";
+  rail.type = JointType::kPrismatic;
+  rail.bodies[0] = 0;
+  rail.axis = Vector2<double>(1.0, 0.0);
+  scene.joints.push_back(rail);
+  BasicForce<double> push;
+  push.name = "push";
+  push.body = 0;
+  push.force = Vector2<double>(-8.0, 0.0);
+  scene.forces.push_back(push);
+  const std::vector<std::string> paths = {"joints/rail/rate", "bodies/b/support/friction",
+                                          "forces/push/force/x"};
+  const GradientResult result = Jacobian(scene, paths, GradientMethod::kAdjoint);
+  // Slower by (8 + 5) / 2 until it stops, then faster by (8 − 5) / 2.
+  const double stops = 1.0 / 6.5, back = 1.0 - stops;
+  EXPECT_NEAR(result.values[0], 0.5 * stops - 0.75 * back * back, 1e-10);
+  EXPECT_NEAR(result.values[3], -1.5 * back, 1e-10);
+  // By the rate: stops / 1 of the way there, and later by 1 / 6.5 afterwards.
+  EXPECT_NEAR(result.jacobian(0, 0), stops + 1.5 * back / 6.5, 1e-8);
+  EXPECT_NEAR(result.jacobian(3, 0), 1.5 / 6.5, 1e-8);
+  ExpectOthersAgree(scene, paths, result);
+}
+
+// The motion of a disc of unit mass by its own integrator: of (v, ω) over σ with dt = |u| dσ, in
+// which it comes to rest exponentially, by the classical rule with small steps.
+void IntegrateDisc(double radius, double limit, double inertia, double x[6]) {
+  const auto rates = [&](const double* at, double* rate) {
+    const double size = std::hypot(at[3], at[4], radius * at[5]);
+    double friction[3];
+    DiscFriction(radius, at + 3, friction);
+    for (int i = 0; i < 3; ++i) {
+      rate[i] = size * at[3 + i];
+      rate[3 + i] = size * limit * friction[i] / (i < 2 ? 1.0 : inertia);
+    }
+  };
+  const double step = 2e-4 / limit;
+  while (std::hypot(x[3], x[4], radius * x[5]) > 1e-9) {
+    double k[4][6], at[6];
+    rates(x, k[0]);
+    for (int s = 1; s < 4; ++s) {
+      for (int i = 0; i < 6; ++i) at[i] = x[i] + (s == 3 ? 1.0 : 0.5) * step * k[s - 1][i];
+      rates(at, k[s]);
+    }
+    for (int i = 0; i < 6; ++i) {
+      x[i] += step / 6.0 * (k[0][i] + 2.0 * k[1][i] + 2.0 * k[2][i] + k[3][i]);
+    }
+  }
+}
+
+// A disc that slides and spins stops both at once, where an integrator written apart has it.
+TEST(SupportsByEventsTest, ADiscThatSlidesAndSpinsStopsBothAtOnce) {
+  const std::string disc = R"("shape": {"circle": {"radius": 0.1}}, "position": [0, 0],
+      "velocity": [0.8, 0.3], "angular_velocity": 9,
+      "support": {"friction": 0.25, "radius": 0.08, "load": 15})";
+  const Scene scene = TableByEvents(disc, 0.002, 0.8);
+  const std::vector<std::string> paths = {"bodies/b/support/friction", "bodies/b/support/radius",
+                                          "bodies/b/support/load",     "bodies/b/mass",
+                                          "bodies/b/velocity/y",       "bodies/b/angular_velocity"};
+  const GradientResult result = Jacobian(scene, paths, GradientMethod::kAdjoint);
+  double x[6] = {0.0, 0.0, 0.0, 0.8, 0.3, 9.0};
+  IntegrateDisc(0.08, 0.25 * 15.0 / 2.0, 0.5 * 0.01, x);
+  for (int i = 0; i < 3; ++i) EXPECT_NEAR(result.values[i], x[i], 1e-9) << i;
+  for (int i = 3; i < 6; ++i) EXPECT_EQ(result.values[i], 0.0) << i;
+  ExpectOthersAgree(scene, paths, result);
+}
+
+// What its speeds tend to, whatever it started with: v / (R ω) of a disc of even mass.
+TEST(SupportsByEventsTest, TheRatioOfADiscsSpeeds) {
+  for (const char* start : {R"("velocity": [1, 0], "angular_velocity": 3)",
+                            R"("velocity": [0.2, 0.1], "angular_velocity": 12)"}) {
+    const Scene scene = TableByEvents(std::string(R"("shape": {"circle": {"radius": 0.1}},
+        "position": [0, 0], "support": {"friction": 0.25, "radius": 0.1}, )") +
+                                          start,
+                                      1e-5, 1.0);
+    Model<double> model;
+    State<double> state;
+    BuildModel(scene, &model, &state);
+    Stepper stepper(model);
+    const auto speed = [&state] { return std::hypot(state.twist[0], state.twist[1]); };
+    double now = 0.0;
+    for (int k = 0; speed() > 1e-9; ++k) {
+      ASSERT_LT(k, 10000);
+      const double h = 0.1 * std::max(speed(), 0.1 * state.twist[2]) / (0.25 * kStandardG);
+      ASSERT_EQ(stepper.Step(model, now, h, &state).status, StepStatus::kDone);
+      now += h;
+    }
+    EXPECT_NEAR(speed() / (0.1 * state.twist[2]), 0.653, 1e-3) << start;
+    ASSERT_EQ(stepper.Step(model, now, 0.01, &state).status, StepStatus::kDone);
+    EXPECT_EQ(speed(), 0.0);
+    EXPECT_EQ(state.twist[2], 0.0);
+  }
+}
+
+// A rod on two feet that is pushed at one of them turns about the other, which rests; the torque of
+// the first foot stops it once the force is gone.
+TEST(SupportsByEventsTest, ARodTurnsAboutAFootThatRests) {
+  Scene scene = TableByEvents(R"("inertia": 0.02, "position": [0, 0],
+      "support": {"friction": 0.25, "load": 20, "points": [[0.3, 0], [-0.3, 0]],
+                  "shares": [1, 9]})",
+                              0.01, 1.0);
+  BasicForce<double> push;
+  push.name = "push";
+  push.body = 0;
+  push.at = Vector2<double>(0.3, 0.0);
+  push.torque = 0.36;
+  push.end = 0.5;
+  scene.forces.push_back(push);
+  const std::vector<std::string> paths = {"forces/push/torque", "bodies/b/support/friction",
+                                          "bodies/b/inertia", "forces/push/end"};
+  const GradientResult result = Jacobian(scene, paths, GradientMethod::kAdjoint);
+  // About the foot at −0.3: I = 0.02 + 2 · 0.09, friction 0.5 · 0.6.
+  const double inertia = 0.02 + 2.0 * 0.09;
+  const double gain = (0.36 - 0.3) / inertia, loss = 0.3 / inertia;
+  const double fastest = 0.5 * gain;
+  const double turn = 0.5 * fastest * 0.5 + 0.5 * fastest * fastest / loss;
+  EXPECT_NEAR(result.values[2], turn, 1e-9);
+  EXPECT_NEAR(result.values[0], 0.3 * (std::cos(turn) - 1.0), 1e-9);
+  EXPECT_NEAR(result.values[1], 0.3 * std::sin(turn), 1e-9);
+  EXPECT_EQ(result.values[5], 0.0);
+  // The whole turn is M² … : ∂/∂torque of gain (0.125 + 0.125 gain / loss).
+  EXPECT_NEAR(result.jacobian(2, 0), (0.125 + 0.25 * gain / loss) / inertia, 1e-6);
+  ExpectOthersAgree(scene, paths, result);
+}
+
+// A block on three feet that another one pushes off its centre, with friction between them.
+TEST(SupportsByEventsTest, BlocksThatPushEachOther) {
+  const std::string block = R"("shape": {"box": {"size": [0.4, 0.3]}}, "position": [0, 0],
+      "angle": 0.05, "friction": 0.2, "support": {"friction": 0.2,
+      "points": [[0.15, 0.1], [-0.15, 0.1], [0, -0.12]], "shares": [2, 1, 1.5]})";
+  Scene scene = TableByEvents(block, 0.01, 0.5, "0, 0", R"(,
+      {"name": "p", "mass": 1, "shape": {"circle": {"radius": 0.1}}, "position": [-0.32, 0.06],
+       "friction": 0.2, "support": {"friction": 0.3, "radius": 0.07}},
+      {"name": "wall", "static": true, "shape": {"half_plane": {"normal": [-1, 0], "offset": -0.5}}})");
+  BasicForce<double> push;
+  push.name = "push";
+  push.body = 1;
+  push.force = Vector2<double>(14.0, 1.0);
+  push.end = 0.3;
+  scene.forces.push_back(push);
+  const std::vector<std::string> paths = {
+      "bodies/b/support/friction", "bodies/b/support/points/1/y", "bodies/b/support/shares/2",
+      "bodies/p/support/radius",   "forces/push/force/x",         "bodies/b/mass"};
+  const GradientResult result = Jacobian(scene, paths, GradientMethod::kAdjoint);
+  EXPECT_GT(result.values[0], 0.05);  // it has been moved
+  for (Eigen::Index c = 0; c < result.jacobian.cols(); ++c) {
+    EXPECT_GT(result.jacobian.col(c).cwiseAbs().maxCoeff(), 1e-6) << paths[c];
+  }
+  ExpectOthersAgree(scene, paths, result);
+}
+
+}  // namespace
+}  // namespace tangible
