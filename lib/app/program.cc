@@ -22,6 +22,7 @@
 #include <system_error>
 #include <utility>
 
+#include "tangible/app/ranks.h"
 #include "tangible/scene/text_file.h"
 
 namespace tangible {
@@ -214,7 +215,8 @@ class PendingFile {
       : path_(std::move(other.path_)),
         target_(std::move(other.target_)),
         temporary_(std::exchange(other.temporary_, {})),
-        direct_text_(other.direct_text_) {}
+        direct_text_(other.direct_text_),
+        is_taken_(other.is_taken_) {}
   PendingFile(const PendingFile&) = delete;
   PendingFile& operator=(const PendingFile&) = delete;
   ~PendingFile() {
@@ -232,10 +234,13 @@ class PendingFile {
   std::filesystem::path target_;
   std::string temporary_;
   std::optional<std::string_view> direct_text_;
+  bool is_taken_ = false;  ///< it is kept in memory
 };
 
 std::string PendingFile::Prepare(std::string_view text, Over over) {
   namespace fs = std::filesystem;
+  is_taken_ = TakeRankOutput(path_, text);
+  if (is_taken_) return "";
   if (over == Over::kNoInput) {
     for (const std::string& input : FilesRead()) {
       if (IsSameFile(path_, input)) return Unwritable(path_, "it was read as an input");
@@ -259,6 +264,7 @@ std::string PendingFile::Prepare(std::string_view text, Over over) {
 }
 
 std::string PendingFile::Commit() {
+  if (is_taken_) return "";
   if (direct_text_) {
     const std::string reason = WriteDirectly(path_, *direct_text_);
     return reason.empty() ? "" : Unwritable(path_, reason);
@@ -276,6 +282,7 @@ const ProgramInfo& ParsedProgram() { return Parsed(); }
 
 CommandLine ParseCommandLine(int argc, char** argv, const ProgramInfo& info) {
   Parsed() = info;
+  BeginRankPart(info);
   CommandLine line;
   bool only_positional = false;
   for (int i = 1; i < argc; ++i) {
@@ -327,13 +334,14 @@ CommandLine ParseCommandLine(int argc, char** argv, const ProgramInfo& info) {
       return line;
     }
   }
+  if (!SetRankPart(info)) line.exit_status = kExitFailed;
   return line;
 }
 
 int RunMain(int (*body)(int, char**), int argc, char** argv) noexcept {
   try {
     TakeFaultsAsErrors();
-    const int exit_status = body(argc, argv);
+    const int exit_status = IsOneOfRanks() ? RunOnRanks(body, argc, argv) : body(argc, argv);
     const std::string lost = LostOutput();
     return exit_status == kExitDone && !lost.empty() ? ReportError(lost) : exit_status;
   } catch (const std::bad_alloc&) {

@@ -4,6 +4,8 @@
 // Reading whole text files, and text that goes into messages.
 
 #include <cstddef>
+#include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -21,6 +23,12 @@ inline constexpr std::size_t kMaxMessage = 500;
 /// socket or a terminal could keep the program waiting or never end, and is refused before anything
 /// is read from it (/dev/stdin is taken where it is redirected from a regular file).
 bool ReadTextFile(const std::string& file, std::string* text, std::string* error);
+
+/// Reads a file's content from elsewhere than the disk: returns why it cannot be read or empty, or
+/// nothing where the file is to be read from the disk. Null: all are.
+using FileReader =
+    std::function<std::optional<std::string>(const std::string& file, std::string* content)>;
+void SetFileReader(FileReader reader);
 
 /// The files that ReadTextFile has read, each once. A program does not write over its inputs,
 /// including those that another file names.

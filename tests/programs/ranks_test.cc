@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Programs that mpirun starts on several ranks: what one process writes, to the bit.
+#include <chrono>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "run_program.h"
+
+namespace tangible {
+namespace {
+
+class RanksTest : public ProgramTest {
+ protected:
+  /// Runs a program on ranks of this machine.
+  ProgramRun RunOn(int ranks, const std::string& program, const std::string& arguments) const {
+    const std::string command = Mpirun(ranks) + " '" + std::string(TANGIBLE_PROGRAM_DIR) + "/" +
+                                program + "' " + arguments + " > '" + Path("o.txt") + "' 2> '" +
+                                Path("e.txt") + "'";
+    const int status = std::system(command.c_str());
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, Read(Path("o.txt")), Read(Path("e.txt"))};
+  }
+
+  /// As root, and with more ranks than cores, Open MPI runs only where it is told to.
+  static std::string Mpirun(int ranks) {
+    return "OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 "
+           "OMPI_MCA_rmaps_base_oversubscribe=1 OMPI_MCA_btl_vader_single_copy_mechanism=none '" +
+           std::string(TANGIBLE_MPIRUN) + "' -n " + std::to_string(ranks);
+  }
+
+  void WriteBall() const {
+    Write("ball.json", R"({"bodies": [
+        {"name": "ball", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0, 1],
+         "restitution": 0.5, "velocity": [1, 0]},
+        {"name": "floor", "static": true, "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
+        "simulation": {"dt": 0.01, "duration": 0.8}})");
+  }
+};
+
+TEST_F(RanksTest, RowsOfABatch) {
+  WriteBall();
+  std::string rows = "bodies/ball/mass,bodies/ball/restitution\n";
+  for (int i = 1; i <= 37; ++i) rows += std::to_string(i) + "," + std::to_string(0.02 * i) + "\n";
+  Write("rows.csv", rows);
+  const std::string batch = "'" + Path("ball.json") + "' --batch='" + Path("rows.csv") + "'";
+  const ProgramRun alone = Run("tangible-simulate", batch);
+  ASSERT_EQ(alone.exit_status, 0) << alone.error;
+  for (const int ranks : {2, 3}) {
+    const ProgramRun run = RunOn(ranks, "tangible-simulate", batch);
+    EXPECT_EQ(run.exit_status, 0) << run.error;
+    EXPECT_EQ(run.out, alone.out);
+    EXPECT_EQ(run.error, alone.error);
+    const ProgramRun to_file =
+        RunOn(ranks, "tangible-simulate", batch + " --out='" + Path("r.csv") + "'");
+    EXPECT_EQ(to_file.exit_status, 0) << to_file.error;
+    EXPECT_EQ(Read(Path("r.csv")), alone.out);
+  }
+}
+
+TEST_F(RanksTest, ARowThatFailsIsSaidOnce) {
+  WriteBall();
+  Write("rows.csv", "bodies/ball/mass\n1\n-1\n2\n");
+  const std::string batch = "'" + Path("ball.json") + "' --batch='" + Path("rows.csv") + "'";
+  const ProgramRun alone = Run("tangible-simulate", batch);
+  const ProgramRun run = RunOn(2, "tangible-simulate", batch);
+  EXPECT_EQ(run.exit_status, alone.exit_status);
+  EXPECT_EQ(run.out, alone.out);
+  EXPECT_EQ(run.error.substr(0, alone.error.size()), alone.error);
+}
+
+// Of a run that nothing divides rank 0 alone makes the files.
+TEST_F(RanksTest, WhatCannotBeDividedIsMadeOnce) {
+  WriteBall();
+  for (const std::string program : {"tangible-simulate", "tangible-gradient"}) {
+    const std::string arguments = "'" + Path("ball.json") + "'";
+    const ProgramRun alone = Run(program, arguments);
+    const ProgramRun run = RunOn(2, program, arguments);
+    EXPECT_EQ(run.exit_status, 0) << run.error;
+    EXPECT_EQ(run.out, alone.out) << program;
+  }
+  const ProgramRun help = RunOn(2, "tangible-fit", "--version");
+  EXPECT_EQ(help.out, Run("tangible-fit", "--version").out);
+}
+
+TEST_F(RanksTest, BadInputGivesOneLine) {
+  WriteBall();
+  const ProgramRun run = RunOn(2, "tangible-simulate",
+                               "'" + Path("ball.json") + "' --batch='" + Path("none.csv") + "'");
+  EXPECT_EQ(run.exit_status, 1);
+  const std::string alone =
+      Run("tangible-simulate", "'" + Path("ball.json") + "' --batch='" + Path("none.csv") + "'")
+          .error;
+  EXPECT_EQ(run.error.substr(0, alone.size()), alone);
+}
+
+TEST_F(RanksTest, StartsOfAFit) {
+  WriteBall();
+  const ProgramRun truth =
+      Run("tangible-simulate", "'" + Path("ball.json") + "' --observe='" + Path("o.csv") + "'");
+  ASSERT_EQ(truth.exit_status, 0) << truth.error;
+  Write("fit.json", nlohmann::json::parse(R"({"scene": "ball.json", "starts": 5,
+      "observations": [{"file": "o.csv", "sigma": 0.01}],
+      "parameters": [{"name": "e", "path": "bodies/ball/restitution", "initial": 0.3, "lower": 0.1,
+                      "upper": 0.9}]})")
+                        .dump());
+  const std::string fit = "'" + Path("fit.json") + "' --threads=1 --out='";
+  ASSERT_EQ(Run("tangible-fit", fit + Path("alone.json") + "'").exit_status, 0);
+  const ProgramRun run = RunOn(2, "tangible-fit", fit + Path("ranks.json") + "'");
+  EXPECT_EQ(run.exit_status, 0) << run.error;
+  EXPECT_EQ(Read(Path("ranks.json")), Read(Path("alone.json")));
+}
+
+TEST_F(RanksTest, RandomScenes) {
+  const std::string verify = "--random=6 --starts=0 --coincidences=0 --out='";
+  ASSERT_EQ(Run("tangible-verify", verify + Path("alone.json") + "'").exit_status, 0);
+  EXPECT_EQ(RunOn(2, "tangible-verify", verify + Path("ranks.json") + "'").exit_status, 0);
+  const auto without_dates = [this](const std::string& file) {
+    nlohmann::json json = nlohmann::json::parse(Read(Path(file)));
+    json.erase("provenance");
+    return json;
+  };
+  EXPECT_EQ(without_dates("ranks.json"), without_dates("alone.json"));
+}
+
+// The others do not wait for a rank that is gone.
+TEST_F(RanksTest, ARankThatDiesEndsTheRun) {
+  WriteBall();
+  std::string rows = "bodies/ball/mass\n";
+  for (int i = 1; i <= 400000; ++i) rows += std::to_string(i) + "\n";
+  Write("rows.csv", rows);
+  const std::string command =
+      Mpirun(2) +
+      " sh -c 'if [ \"$OMPI_COMM_WORLD_RANK\" = 1 ]; then (sleep 1; kill -9 $$) & fi; exec \"" +
+      std::string(TANGIBLE_PROGRAM_DIR) + "/tangible-simulate\" \"" + Path("ball.json") +
+      "\" --batch=\"" + Path("rows.csv") + "\" --out=\"" + Path("r.csv") + "\"' 2> '" +
+      Path("e.txt") + "'";
+  const auto start = std::chrono::steady_clock::now();
+  const int status = std::system(command.c_str());
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
+  EXPECT_NE(status, 0);
+  EXPECT_LT(took.count(), 11.0);
+  EXPECT_NE(Read(Path("e.txt")).find("a rank of the run has ended before its work was done"),
+            std::string::npos)
+      << Read(Path("e.txt"));
+  EXPECT_FALSE(std::filesystem::exists(Path("r.csv")));
+}
+
+}  // namespace
+}  // namespace tangible
