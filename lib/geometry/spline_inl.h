@@ -6,7 +6,7 @@
 // Piece i of a spline is the cubic c(s) between its points i and i + 1 (math/spline_curve.h), with
 // 0 ≤ s ≤ h. Its unit normal is n = (c'_y, −c'_x)/|c'|, to the right of the way along the points,
 // because the solid is on the left. A vertex x, or the point x(−n) that an ellipse has farthest
-// along −n, has its foot where
+// along −n, has its foot where:
 //   F(s) = (x − c)·c' = 0,   F' = −|c'|² + (x − c)·c'' − ρ (c' × c'')/|c'| < 0              (1)
 //   gap = n·(x − c) − radius
 // (ρ: the radius of curvature of the ellipse there, else 0). The root is found in double. Two

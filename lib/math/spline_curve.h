@@ -5,7 +5,7 @@
 // continuously differentiable, with not-a-knot ends (cubic_spline.h), or periodic if it is closed.
 //
 // Of the periodic one, with chords h_i from point i to point i + 1 and slopes d_i of one coordinate
-// (indices modulo n), the second derivatives m_i solve
+// (indices modulo n), the second derivatives m_i solve:
 //   h_{i−1} m_{i−1} + 2 (h_{i−1} + h_i) m_i + h_i m_{i+1} = 6 (d_i − d_{i−1}),
 // which is tridiagonal but for two corners. These are a matrix of rank one (Sherman and Morrison).
 //

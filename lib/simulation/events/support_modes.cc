@@ -12,8 +12,6 @@ namespace {
 
 // Motions at supports end at multiples of dt / 2^k with k up to this.
 constexpr int kMostSupportHalvings = 30;
-// Of the spacing of such multiples: the rounding of a time.
-constexpr double kGridSlack = 1e-3;
 
 // The speed of a part of a support at a twist: of all of it, as a body, or of a point, m/s.
 double SpeedOfPart(const SupportFriction& friction, int part, const double twist[3]) {
@@ -235,7 +233,6 @@ bool SupportModes::Accept(const Model<double>& model, const ContactProblem<doubl
 // which it starts.
 bool SupportModes::AcceptPoint(int point, const double acceleration[3], double turn,
                                const double* held, int* changes, SupportState* at) const {
-  constexpr double kSettledDirection = 1e-13;
   constexpr int kMostDirections = 40;
   const SupportPoint& of = friction_.points()[static_cast<size_t>(point)];
   double way[2];
@@ -251,7 +248,7 @@ bool SupportModes::AcceptPoint(int point, const double acceleration[3], double t
     const double size = std::hypot(of_point[0], of_point[1]);
     if (!(size > 0.0) || *changes > kMostDirections) return true;
     for (int i = 0; i < 2; ++i) way[i] = of_point[i] / size;
-    if (std::hypot(way[0] - at->twist[0], way[1] - at->twist[1]) <= kSettledDirection) return true;
+    if (std::hypot(way[0] - at->twist[0], way[1] - at->twist[1]) <= kSupportDirection) return true;
   }
   ++*changes;
   at->twist = {way[0], way[1], 0.0};
@@ -379,9 +376,9 @@ void SupportModes::Shorten(const Model<double>& model, const std::vector<double>
   }
   // The slack is that of the time's rounding.
   const double since = (segment->time - start_) / spacing;
-  const double next = start_ + (std::floor(since + kGridSlack) + 1.0) * spacing;
+  const double next = start_ + (std::floor(since + kSupportGridSlack) + 1.0) * spacing;
   const double length = next - segment->time;
-  if (!(length > 0.0) || length >= segment->length - kGridSlack * spacing) return;
+  if (!(length > 0.0) || length >= segment->length - kSupportGridSlack * spacing) return;
   segment->length = length;
   segment->middle = segment->time + 0.5 * length;
 }

@@ -7,10 +7,10 @@
 // the direction of its start, so that the speed along it passes through 0 at an instant
 // (support_bounds.h). Then
 //
-//   a body whose points all rest   stays, or starts in the direction of its acceleration: the
-//                                  problem of a step, of accelerations in the place of twists
-//   a body that turns about a      keeps it while |f_i| ≤ μ N_i; otherwise the point starts in the
-//   point that rests               direction of its acceleration
+//   a body whose points all rest   stays, or starts in the direction of its acceleration
+//   a body that turns about one    keeps it while |f_i| ≤ μ N_i, or lets that point start
+//
+// The first is the problem of a step, of accelerations in the place of twists.
 //
 // A body that starts has that direction for its friction as long as it is slow: friction would
 // align its velocity with it within a time that is short beside dt.

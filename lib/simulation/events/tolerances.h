@@ -190,6 +190,11 @@ inline constexpr double kSupportTurn = 1.0 / 32.0;
 /// Times the rate at which friction turns a velocity into the direction of its point's motion: a
 /// motion is no longer, by which one of fourth order is stable and its error as small as above.
 inline constexpr double kSupportDecay = 0.5;
+/// Of dt / 2^k: motions at supports end at multiples of it, up to the rounding of a time.
+inline constexpr double kSupportGridSlack = 1e-3;
+/// The norm of the difference of two unit vectors: the direction in which a point of a support
+/// starts is found to it.
+inline constexpr double kSupportDirection = 1e-13;
 /// Of the wrench that a support balances: its limit is located to it.
 inline constexpr double kSupportLocated = 1e-13;
 

@@ -22,11 +22,11 @@
 #include "tangible/lcp/contact/contact_inner_impulses.h"
 #include "tangible/lcp/contact/contact_islands.h"
 #include "tangible/lcp/contact/contact_solver.h"
+#include "tangible/simulation/events/support_iteration.h"
 #include "tangible/simulation/islands/island_derivative.h"
 #include "tangible/simulation/islands/island_jets.h"
 #include "tangible/simulation/islands/island_step.h"
 #include "tangible/simulation/stepping/joint_projection.h"
-#include "tangible/simulation/events/support_iteration.h"
 
 namespace tangible {
 

@@ -242,9 +242,9 @@ TEST(SplineTest, SlidingAndRollingInALoopAsByAnotherIntegrator) {
 }
 
 // On a cycloid the way along it from the bottom, σ = 4 a sin(φ/2), swings with ω = √(g/(4a)),
-// however far. A curve through n points of it is wrong by O(n⁻⁴), and so is the time to the bottom of a
-// point that comes with a speed. At a point of rest, where the speed is √ of the height, half an
-// order is lost.
+// however far. A curve through n points of it is wrong by O(n⁻⁴), and so is the time to the bottom
+// of a point that comes with a speed. At a point of rest, where the speed is √ of the height, half
+// an order is lost.
 TEST(SplineTest, ACycloidIsOfFourthOrder) {
   const double a = 0.25, frequency = std::sqrt(kGravity / (4.0 * a)), from = -1.82;
   const auto at = [&](double phi) {
