@@ -328,8 +328,9 @@ void SceneMaker::Supports() {
     if (has_joint) continue;
     BasicSupport<double>& support = body.support.emplace();
     // Gravity lies in the plane: from a body that it drags along to one that it cannot move.
-    support.friction = std::pow(10.0, random.Uniform(-2.0, 0.3));
-    if (random.Chance(0.5)) support.load = body.mass * random.Uniform(1.0, 20.0);
+    // By events the motions of a body that friction stops quickly are many.
+    support.friction = std::pow(10.0, random.Uniform(-2.0, by_events ? -0.7 : 0.3));
+    if (random.Chance(0.5) && !by_events) support.load = body.mass * random.Uniform(1.0, 20.0);
     const double size = random.Uniform(0.05, 0.3);
     if (random.Chance(0.3)) {
       support.radius = size;

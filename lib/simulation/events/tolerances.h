@@ -185,8 +185,8 @@ inline constexpr double kStartingAlong = 0.99;
 /// Of dt: the first motion of a body that its support lets go.
 inline constexpr double kFirstOfSupport = 1e-3;
 /// A motion changes the velocity of a point on a support by no more than this share; the error of a
-/// motion of fourth order is some 1e-9 of the way to rest.
-inline constexpr double kSupportTurn = 1.0 / 32.0;
+/// motion of fourth order is some 1e-8 of the way to rest.
+inline constexpr double kSupportTurn = 1.0 / 16.0;
 /// Times the rate at which friction turns a velocity into the direction of its point's motion: a
 /// motion is no longer, by which one of fourth order is stable and its error as small as above.
 inline constexpr double kSupportDecay = 0.5;
