@@ -103,9 +103,9 @@ OrderedJson ParametersJson(const Dynamics& dynamics, const DiscWorld& world) {
 }
 
 // The mean losses of a training over equal parts of it.
-class Curve {
+class LossCurve {
  public:
-  explicit Curve(long iterations) : part_(std::max(1L, iterations / kCurvePoints)) {}
+  explicit LossCurve(long iterations) : part_(std::max(1L, iterations / kCurvePoints)) {}
   void Add(long iteration, const TrainingLoss& loss) {
     sum_ += loss.total;
     ++count_;
@@ -184,7 +184,7 @@ CellResult RunCell(const StudyCell& cell, const StudyData& data, const CellHooks
   if (hooks.checkpoint && !trainer->Load(*hooks.checkpoint, cell.name + ": checkpoint", error)) {
     return result;
   }
-  Curve curve(cell.training.iterations);
+  LossCurve curve(cell.training.iterations);
   const double start = ThreadCpuSeconds();
   const long from = trainer->iteration();
   while (trainer->iteration() < cell.training.iterations) {

@@ -63,22 +63,6 @@ int FeatureNumbers(ShapeType type, int num_numbers, bool is_edge, int feature,
   return 2;
 }
 
-template <typename T>
-ContactFeature FeatureAt(const ContactFeature& feature, const ShapeView<T>& shape_a,
-                         const Pose<T>& pose_a, const ShapeView<T>& shape_b,
-                         const Pose<T>& pose_b) {
-  if (feature.places == 0) return feature;
-  ContactFeature moved = feature;
-  if (feature.kind == FeatureKind::kVertexEdge) {
-    moved.b = internal::PlaceAt(shape_b, feature.b,
-                                internal::FootOver(shape_a, pose_a, feature.a, pose_b));
-  } else {
-    moved.a = internal::PlaceAt(shape_a, feature.a,
-                                internal::FootOver(shape_b, pose_b, feature.b, pose_a));
-  }
-  return moved;
-}
-
 #define TANGIBLE_INSTANTIATE_FEATURE(T)                                                         \
   template ContactFeature FeatureAt(const ContactFeature&, const ShapeView<T>&, const Pose<T>&, \
                                     const ShapeView<T>&, const Pose<T>&);

@@ -176,6 +176,22 @@ template <typename T>
 namespace tangible {
 
 template <typename T>
+ContactFeature FeatureAt(const ContactFeature& feature, const ShapeView<T>& shape_a,
+                         const Pose<T>& pose_a, const ShapeView<T>& shape_b,
+                         const Pose<T>& pose_b) {
+  if (feature.places == 0) return feature;
+  ContactFeature moved = feature;
+  if (feature.kind == FeatureKind::kVertexEdge) {
+    moved.b = internal::PlaceAt(shape_b, feature.b,
+                                internal::FootOver(shape_a, pose_a, feature.a, pose_b));
+  } else {
+    moved.a = internal::PlaceAt(shape_a, feature.a,
+                                internal::FootOver(shape_b, pose_b, feature.b, pose_a));
+  }
+  return moved;
+}
+
+template <typename T>
 ContactGeometry<T> EvaluateContact(const ContactFeature& feature, const ShapeView<T>& shape_a,
                                    const Pose<T>& pose_a, const ShapeView<T>& shape_b,
                                    const Pose<T>& pose_b) {
