@@ -282,7 +282,6 @@ const ProgramInfo& ParsedProgram() { return Parsed(); }
 
 CommandLine ParseCommandLine(int argc, char** argv, const ProgramInfo& info) {
   Parsed() = info;
-  BeginRankPart(info);
   CommandLine line;
   bool only_positional = false;
   for (int i = 1; i < argc; ++i) {

@@ -142,7 +142,7 @@ class Ranks {
         return ReadShard(file, content);
       });
     }
-    const int exit_status = body_(argc_, argv_);
+    const int exit_status = Body();
     for (int rank = 1; rank < messages_.size; ++rank) messages_.send(rank, kEnd, nullptr, 0);
     return exit_status;
   }
@@ -167,6 +167,12 @@ class Ranks {
   }
 
  private:
+  // Flags begin at their defaults each time.
+  int Body() {
+    const gflags::FlagSaver saver;
+    return body_(argc_, argv_);
+  }
+
   template <typename Next, typename Finished>
   void RunShards(const Next& next, const Finished& finished) {
     for (long shard = next(); shard >= 0; shard = next()) {
@@ -175,7 +181,7 @@ class Ranks {
       Part().shard = shard;
       Part().of = shards_;
       try {
-        body_(argc_, argv_);
+        Body();
       } catch (const std::exception&) {
         Part().text.reset();  // rank 0 meets it again, and says what it is
       }
@@ -281,17 +287,6 @@ int RunOnRanks(int (*body)(int, char**), int argc, char** argv) {
   return exit_status;
 }
 
-void BeginRankPart(const ProgramInfo& info) {
-  if (!IsOneOfRanks()) return;
-  std::vector<gflags::CommandLineFlagInfo> flags;
-  gflags::GetAllFlags(&flags);
-  for (const gflags::CommandLineFlagInfo& flag : flags) {
-    if (flag.filename == info.source_file) {
-      gflags::SetCommandLineOption(flag.name.c_str(), flag.default_value.c_str());
-    }
-  }
-}
-
 bool SetRankPart(const ProgramInfo& info) {
   const RankPart& part = Part();
   if (part.kind == RankPart::Kind::kWhole) return true;
@@ -308,7 +303,9 @@ bool SetRankPart(const ProgramInfo& info) {
     gflags::SetCommandLineOption("merge", files.c_str());
     return true;
   }
-  for (const std::string& name : info.outputs) gflags::SetCommandLineOption(name.c_str(), "");
+  for (const std::string& name : info.outputs) {
+    if (!is_default(name.c_str())) gflags::SetCommandLineOption(name.c_str(), "");
+  }
   gflags::SetCommandLineOption("out", NameOfShard(part.shard).c_str());
   const std::string shard = std::to_string(part.shard) + "/" + std::to_string(part.of);
   gflags::SetCommandLineOption("shard", shard.c_str());

@@ -27,9 +27,7 @@ int RunOnRanks(int (*body)(int, char**), int argc, char** argv);
 
 // What ParseCommandLine and files ask, while a shard is run or the shards are put together.
 
-/// Sets the flags of a program back to their defaults, before its arguments are read again.
-void BeginRankPart(const ProgramInfo& info);
-/// Sets those that make it run a shard, or put the shards together. False where it cannot run a
+/// Sets the flags that make it run a shard, or put the shards together. False where it cannot run a
 /// shard, which it then must not begin.
 bool SetRankPart(const ProgramInfo& info);
 /// Takes the text of a shard's file, which is written nowhere; false where the path is another one.

@@ -103,7 +103,7 @@ TEST_F(RanksTest, StartsOfAFit) {
       "parameters": [{"name": "e", "path": "bodies/ball/restitution", "initial": 0.3, "lower": 0.1,
                       "upper": 0.9}]})")
                         .dump());
-  const std::string fit = "'" + Path("fit.json") + "' --threads=1 --out='";
+  const std::string fit = "'" + Path("fit.json") + "' --out='";
   ASSERT_EQ(Run("tangible-fit", fit + Path("alone.json") + "'").exit_status, 0);
   const ProgramRun run = RunOn(2, "tangible-fit", fit + Path("ranks.json") + "'");
   EXPECT_EQ(run.exit_status, 0) << run.error;
