@@ -506,9 +506,7 @@ std::string PlanNext(const Prepared& prepared, const FitResult& result,
 int Run(const std::string& text, const std::string& file, const ShardPlan& plan) {
   Prepared prepared;
   const int status = Prepare(text, file, &prepared);
-  if (status != kExitDone) {
-    return status;
-  }
+  if (status != kExitDone) return status;
   FitCheckpoint* const checkpoint = prepared.checkpoint.get();
   const FitOptions& options = prepared.fit.input.options();
   std::string error = plan.part != ShardPlan::Part::kAll ? HashInputs() : "";

@@ -40,6 +40,7 @@ Side Look(const ChoiceList& own, const ChoicesAt& choices_at, double size, doubl
   Side side;
   for (const double step : {kRadiusStep, kRadiusStep * kSmallerStep}) {
     side.shift = sign * step * size;
+    side.differs = nullptr;  // of the choices that are found anew
     side.ran = choices_at(side.shift, &side.choices);
     if (!side.ran) return side;
     side.differs = FirstDifference(own, side.choices);
