@@ -78,6 +78,9 @@ void* OpenLibrary(std::string* error) {
   return nullptr;
 }
 
+// Where errors are shown while shards are run.
+volatile std::sig_atomic_t shown_errors = STDERR_FILENO;
+
 // What is printed while shards are run would be printed again as they are put together.
 class Silence {
  public:
@@ -88,8 +91,10 @@ class Silence {
       if (nowhere >= 0) ::dup2(nowhere, STDOUT_FILENO + i);
     }
     if (nowhere >= 0) ::close(nowhere);
+    shown_errors = kept_[1];
   }
   ~Silence() {
+    shown_errors = STDERR_FILENO;
     std::fflush(nullptr);
     for (int i = 0; i < 2; ++i) {
       ::dup2(kept_[i], STDOUT_FILENO + i);
@@ -105,7 +110,7 @@ class Silence {
 
 void SayThatARankDied(int) {
   constexpr char kText[] = "a rank of the run has ended before its work was done\n";
-  static_cast<void>(!::write(STDERR_FILENO, kText, sizeof kText - 1));
+  static_cast<void>(!::write(shown_errors, kText, sizeof kText - 1));
   std::_Exit(kExitFailed);
 }
 
