@@ -631,6 +631,25 @@ TEST_F(TangibleFitTest, AnInertiaThatRunsToZeroIsAtItsBound) {
   }
 }
 
+// A force that begins at 0.43 s, found from where it begins on the end of a step.
+TEST_F(TangibleFitTest, TheStartOfAForceIsFoundFromAStepsEnd) {
+  Write("push.json", R"({"gravity": [0, 0], "bodies": [{"name": "b", "mass": 1, "inertia": 1,
+      "position": [0, 0]}], "forces": [{"name": "f", "body": "b", "force": [4, 0], "start": 0.5}],
+      "simulation": {"dt": 0.01, "duration": 1, "stepping": "event"}})");
+  std::string text = "time,body,x\n";
+  for (int k = 0; k <= 20; ++k) {
+    const double since = std::max(0.0, 0.05 * k - 0.43);
+    text += json(0.05 * k).dump() + ",b," + json(2.0 * since * since).dump() + "\n";
+  }
+  Write("o.csv", text);
+  for (const double initial : {0.5, 0.25, 0.503}) {
+    json fit = {{"scene", "push.json"}, {"observations", {{{"file", "o.csv"}, {"sigma", 0.001}}}}};
+    fit["parameters"] = {{{"path", "forces/f/start"}, {"initial", initial}}};
+    ASSERT_EQ(Fit(fit, "--out='" + Path("r.json") + "'").exit_status, 0) << initial;
+    EXPECT_NEAR(json::parse(Read(Path("r.json")))["parameters"][0]["estimate"], 0.43, 1e-6);
+  }
+}
+
 // Huber's loss of a value is finite where its square is not, which all that is said of a fit needs.
 TEST_F(TangibleFitTest, AValueWhoseSquareOverflowsIsAnError) {
   json fit = Problem({{"loss", {{"huber", 2}}}});

@@ -59,6 +59,45 @@ TEST(GradientSidesTest, ABoxPushedWithItsFriction) {
   EXPECT_NEAR(Plus(scene, "forces/push/force/x", 0), 0.5 * kTime * kTime, 1e-10);
 }
 
+// A block that is released on a slope slides at once: at g cos α below that of a slope without
+// friction, as for any friction nearby, from both sides and without an alarm.
+TEST(GradientSidesTest, ABlockReleasedOnASlope) {
+  for (const auto& [along, across, friction] :
+       {std::tuple(7.514895986997175, -6.305746451024952, 0.5256), std::tuple(-6.0, -8.0, 0.25),
+        std::tuple(1.0, -9.75, 0.0625)}) {
+    Scene scene = Of(R"({"name": "block", "shape": {"box": {"size": [0.1, 0.05]}}, "mass": 0.0822,
+        "position": [0, 0.025], "friction": 0.5})");
+    scene.gravity = Vector2<double>(along, across);
+    for (auto& body : scene.bodies) body.friction = friction;
+    for (const Stepping stepping : {Stepping::kEvent, Stepping::kFixed}) {
+      scene.simulation.stepping = stepping;
+      scene.simulation.integrator.reset();
+      const std::vector<std::string> paths = {"bodies/*/friction", "gravity/x",
+                                              "bodies/block/mass"};
+      // By fixed steps a step moves with its end's speed.
+      const double way = 0.5 * kTime * (kTime + (stepping == Stepping::kFixed ? 0.0078125 : 0.0));
+      const double downhill = along > 0.0 ? 1.0 : -1.0;
+      const double exact[] = {downhill * across * way, way, 0.0};
+      for (const GradientMethod method :
+           {GradientMethod::kTangent, GradientMethod::kAdjoint, GradientMethod::kJetImplicit,
+            GradientMethod::kFiniteDifference}) {
+        const GradientResult both = testing::Jacobian(scene, paths, method);
+        EXPECT_EQ(both.certificate.verdict, "trustworthy") << along << " " << NameOf(method);
+        for (int k = 0; k < 3; ++k) {
+          EXPECT_NEAR(both.jacobian(0, k), exact[k], 1e-9) << paths[k] << " " << NameOf(method);
+        }
+      }
+      for (const DerivativeSide side : {DerivativeSide::kPlus, DerivativeSide::kMinus}) {
+        for (int k = 0; k < 3; ++k) {
+          const GradientResult one = Sided(scene, paths[k], side);
+          ASSERT_TRUE(one.done) << one.message;
+          EXPECT_NEAR(one.jacobian(0, 0), exact[k], 1e-9) << paths[k] << " " << along;
+        }
+      }
+    }
+  }
+}
+
 // The friction of a box at rest is 4 N, so that a push which begins a little before a step holds it
 // for that step.
 TEST(GradientSidesTest, AForceThatBeginsOrEndsOnAFixedStepsEnd) {

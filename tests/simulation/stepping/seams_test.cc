@@ -8,6 +8,7 @@
 #include <random>
 #include <sstream>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "../../support/scenes.h"
@@ -355,6 +356,95 @@ TEST(SeamsTest, ADiscLandsJustBeforeASeam) {
   for (const double speed : {1.5, -1.5, 2.7}) {
     Course course{.height = 0.12, .spin = 0.0, .speed = speed, .width = 0.1};
     ExpectAsOnOneFloor(course, "speed " + Number(speed));
+  }
+}
+
+// Two tiles whose heights differ by what places of a file are rounded to: a box goes on as on one
+// floor, in both steppings and at once.
+TEST(SeamsTest, TilesOfNearlyTheSameHeight) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> off(-1e-9, 1e-9);
+  for (int k = 0; k < 6; ++k) {
+    const double first = k == 0 ? -1.3210487e-10 : off(random);
+    const double second = k == 0 ? 6.4042265e-10 : off(random);
+    for (const Stepping stepping : {Stepping::kFixed, Stepping::kEvent}) {
+      std::string bodies;
+      for (const auto& [name, x, y] :
+           {std::tuple("t1", "0", first), std::tuple("t2", "0.5", second),
+            std::tuple("t3", "1", first)}) {
+        bodies += std::string(R"({"name": ")") + name +
+                  R"(", "static": true, "shape": {"box": {"size": [0.5, 0.4]}}, "friction": 0.2,
+                     "position": [)" +
+                  x + ", " + Number(-0.2 + y) + "]}, ";
+      }
+      Scene scene = test_scenes::SceneOf(R"({"bodies": [)" + bodies + R"(
+          {"name": "a", "shape": {"box": {"size": [0.4, 0.2]}}, "mass": 1, "position": [0, 0.1],
+           "velocity": [3, 0], "friction": 0.2}], "simulation": {"dt": 0.01, "duration": 0.3}})");
+      scene.simulation.stepping = stepping;
+      RolloutReport report;
+      const State<double> final = EndOf(scene, &report);
+      ASSERT_EQ(report.status, StepStatus::kDone) << report.message;
+      const double a = 0.2 * 9.81;
+      const double lag = stepping == Stepping::kFixed ? 0.01 : 0.0;
+      EXPECT_NEAR(final.pose[9], 3.0 * 0.3 - 0.5 * a * 0.3 * (0.3 + lag), 1e-7) << first << second;
+      EXPECT_NEAR(final.twist[9], 3.0 - a * 0.3, 1e-6) << first << second;
+      EXPECT_LE(report.events, 20) << first << second;
+    }
+  }
+}
+
+// A sliding box passes onto a tile that is lower by next to nothing, and stops where friction stops
+// it: v² / (2 μ g) further, by fixed steps up to v h / 2 short of it.
+TEST(SeamsTest, ABoxStopsBeyondALowerTile) {
+  for (const double step : {0.0, -1e-10, -1e-9, -1e-8}) {
+    for (const Stepping stepping : {Stepping::kFixed, Stepping::kEvent}) {
+      Scene scene = SceneOfCourse(
+          {.shape = R"({"box": {"size": [0.4, 0.2]}})", .spin = 0.0, .speed = 2.0, .width = 2.0},
+          stepping, true);
+      for (auto& body : scene.bodies) body.friction = 0.2;
+      scene.bodies[2].position[1] += step;
+      scene.simulation.duration = 1.2;
+      RolloutReport report;
+      const State<double> final = EndOf(scene, &report);
+      ASSERT_EQ(report.status, StepStatus::kDone) << report.message;
+      const double way = 4.0 / (2.0 * 0.2 * 9.81);
+      EXPECT_NEAR(final.pose[0], -0.5 + way, stepping == Stepping::kFixed ? 0.011 : 1e-7) << step;
+      EXPECT_NEAR(final.twist[0], 0.0, 1e-12) << step;
+    }
+  }
+}
+
+// A cart on two wheels that roll over many tiles keeps its speed.
+TEST(SeamsTest, ACartRollsOverTiles) {
+  for (const double width : {0.1, 0.07, 0.25}) {
+    for (const Stepping stepping : {Stepping::kFixed, Stepping::kEvent}) {
+      std::string bodies;
+      const int count = static_cast<int>(std::lround(3.0 / width));
+      for (int i = 0; i < count; ++i) {
+        bodies += R"({"name": "t)" + std::to_string(i) +
+                  R"(", "static": true, "friction": 0.5, "shape": {"box": {"size": )" +
+                  Pair(width, 0.4) + R"(}}, "position": )" + Pair(-0.5 + (i + 0.5) * width, -0.2) +
+                  "}, ";
+      }
+      Scene scene = test_scenes::SceneOf(R"({"bodies": [)" + bodies + R"(
+          {"name": "ch", "shape": {"box": {"size": [0.6, 0.1]}}, "mass": 5, "position": [0, 0.25],
+           "velocity": [2, 0]},
+          {"name": "w0", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [-0.2, 0.1],
+           "velocity": [2, 0], "angular_velocity": -20, "friction": 0.5},
+          {"name": "w1", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0.2, 0.1],
+           "velocity": [2, 0], "angular_velocity": -20, "friction": 0.5}],
+        "joints": [{"name": "j0", "type": "revolute", "bodies": ["w0", "ch"], "anchor": [-0.2, 0.1]},
+                   {"name": "j1", "type": "revolute", "bodies": ["w1", "ch"], "anchor": [0.2, 0.1]}],
+        "no_contact": [["ch", "*"], ["w0", "w1"]], "simulation": {"dt": 0.01, "duration": 0.9}})");
+      scene.simulation.stepping = stepping;
+      RolloutReport report;
+      const State<double> final = EndOf(scene, &report);
+      ASSERT_EQ(report.status, StepStatus::kDone) << report.message;
+      const size_t a = 3 * static_cast<size_t>(count);
+      EXPECT_NEAR(final.pose[a], 1.8, 1e-9) << width;
+      EXPECT_NEAR(final.pose[a + 1], 0.25, 1e-9) << width;
+      EXPECT_NEAR(final.twist[a], 2.0, 1e-9) << width;
+    }
   }
 }
 
