@@ -245,6 +245,22 @@ void RolloutCertifier::AddSupports(const Model<double>& model, long step,
   });
 }
 
+// Friction of a support acts from the first step on, whether the body slides or rests.
+void RolloutCertifier::AddSupportsWithoutFriction(const Model<double>& model,
+                                                  const StepRecord& first) {
+  const ModelStructure& s = *model.structure;
+  for (const SupportIndex& support : s.supports) {
+    const int friction = support.numbers + SupportIndex::kFriction;
+    if (model.parameters[friction] != 0.0 || !Wanted(friction)) continue;
+    ActiveContact contact;
+    contact.a = support.body;
+    contact.b = s.world();
+    contact.is_support = true;
+    const Place place{&s, 0, first.time, 0, &contact, ContactMode::kOpen};
+    OneSided("friction is 0, " + place.Text());
+  }
+}
+
 // The mode of a servo is that of its effort at the step's start.
 void RolloutCertifier::AddServos(const Model<double>& model, long step, const StepRecord& record) {
   const ModelStructure& s = *model.structure;
@@ -280,6 +296,7 @@ void RolloutCertifier::AddStep(const Model<double>& model, long step, Stepper* s
   if (!coordinates_) coordinates_.emplace(model);
   step_margin_ = std::numeric_limits<double>::infinity();
   const StepRecord& at = stepper->record();
+  if (step == 0) AddSupportsWithoutFriction(model, at);
   coordinates_->LookAtContacts(at.before, at.time, at.contacts);
   coordinates_->LookAtJoints(model, at.before, at.time);
   if (stepper->by_events()) {

@@ -13,14 +13,17 @@
 //                  that the next step would cancel
 //   energy         that has grown by events though nothing drives the scene: motions were too long
 //                  for the integrator; counts as a jump (energy_watch.h)
-//   one-sided      friction exactly 0, equal coefficients in the mixing rule, an edge of a force's
-//                  window at the start or the end of the run, or with fixed stepping on any step's
-//                  boundary: only where derivatives with respect to these
-//                  numbers are wanted; and with event stepping a contact that touches as the run
-//                  starts, where a direction opens or closes its gap: on one side the body falls
-//                  and lands, on the other it is pushed out
+//   one-sided      friction exactly 0, of a contact, its rolling, a joint, a motor or a support (no
+//                  damping, stiffness or drag of 0: its law goes on below 0), equal coefficients in
+//                  the mixing rule, an edge of a force's window at the start or the end of the run,
+//                  or with fixed stepping on any step's boundary: only where derivatives with
+//                  respect to these numbers are wanted; and with event stepping a contact that
+//                  touches as the run starts, where a direction opens or closes its gap: on one
+//                  side the body falls and lands, on the other it is pushed out
 //   controls       an event at the boundary of two steps whose controls differ: different forces
 //                  act before and after it, and its derivative differs on each side
+//   loads          by events, a slip that ends or an impact as a load on its bodies jumps: a
+//                  force's window, a signal, the end of a joint, a path's rate
 //   split          by events, an event on the end of a step, where the motion before or behind it
 //                  has an integrator's error: beside it the event splits one step or the other
 //   end            by events, an event at the last instant of the run: beside it the event has
@@ -80,6 +83,7 @@ class RolloutCertifier {
   void AddJump(double margin, const Place& place, const std::string& what);
   void AddServos(const Model<double>& model, long step, const StepRecord& record);
   void AddSupports(const Model<double>& model, long step, const StepRecord& record);
+  void AddSupportsWithoutFriction(const Model<double>& model, const StepRecord& first);
   void AddDiscreteMap(const Model<double>& model, long step, const StepRecord& record);
   void AddEventStep(const Model<double>& model, long step, Stepper* stepper);
   void AddIsland(const Model<double>& model, long step, EventDerivative* derivative,
@@ -102,6 +106,8 @@ class RolloutCertifier {
   void AddSplits(const Model<double>& model, long step, const Segment& segment);
   void AddImpact(const Model<double>& model, long step, Impulses* impact);
   void AddOtherSlips(const Model<double>& model, const Segment& segment, const Place& place);
+  void AddJumpsOfLoads(const Model<double>& model, const Segment& segment, const Place& place);
+  void AddBesideJumps(const Model<double>& model, const Segment& segment);
   void AddEventOf(const Model<double>& model, long step, EventDerivative* derivative,
                   Segment* segment);
   void AddSegment(const Model<double>& model, long step, EventDerivative* derivative,
@@ -171,6 +177,17 @@ class RolloutCertifier {
     double distance = 0.0;  ///< steps
   };
   std::vector<Boundary> boundaries_;  ///< whose next motion is still to come
+  /// The same of an event at the instant at which a load on its bodies jumps.
+  struct BesideJump {
+    ActiveContact contact;
+    double distance = 0.0;  ///< steps
+    long step = 0;
+    double time = 0.0;
+    std::string what;
+    bool is_touch = false;
+    bool rebounds = false;  ///< an impact with a restitution
+  };
+  std::vector<BesideJump> beside_jumps_;
   // The three of all islands, while closed_, loaded_ and struck_at_ are those of one.
   std::vector<ActiveContact> all_closed_, all_loaded_;
   std::vector<double> all_struck_at_;

@@ -20,8 +20,10 @@
 #include "tangible/simulation/derivatives/tolerances.h"
 #include "tangible/simulation/events/coupled_bodies.h"
 #include "tangible/simulation/events/event_counts.h"
+#include "tangible/simulation/events/event_edges.h"
 #include "tangible/simulation/events/event_search.h"
 #include "tangible/simulation/events/segment_flow.h"
+#include "tangible/simulation/events/support_bounds.h"
 #include "tangible/simulation/events/tolerances.h"
 
 namespace tangible {
@@ -141,6 +143,77 @@ void RolloutCertifier::AddFriction(const CoefficientSource& friction, const Plac
   }
 }
 
+// An event at the instant at which a load jumps that acts on its bodies: beside it the load jumps
+// before the event or behind it. The next motion tells whether that matters.
+void RolloutCertifier::AddJumpsOfLoads(const Model<double>& model, const Segment& segment,
+                                       const Place& place) {
+  const bool matters = segment.event == EventKind::kSlipEnds ||
+                       segment.event == EventKind::kTouch ||
+                       segment.event == EventKind::kSupportStops;
+  if (!matters) return;
+  const ModelStructure& s = *model.structure;
+  const double near = kBesideControls * s.settings.dt;
+  const ActiveContact& event = segment.event_contact;
+  for (const LoadJump& jump : LoadJumpsWithin(model, place.time - near, place.time + near)) {
+    std::vector<ActiveContact> contacts = segment.contacts;
+    contacts.push_back(event);
+    CoupledBodies coupled;
+    coupled.Connect(s, contacts);
+    const int group = coupled.GroupOf(event);
+    const auto acts_on = [&](int body) {
+      return coupled.GroupOf(body) == group ||
+             std::any_of(contacts.begin(), contacts.end(), [&](const ActiveContact& contact) {
+               return (contact.a == body || contact.b == body) && coupled.GroupOf(contact) == group;
+             });
+    };
+    if (!std::any_of(jump.bodies.begin(), jump.bodies.end(), acts_on)) continue;
+    const double distance = std::abs(jump.time - place.time) / s.settings.dt;
+    const std::string what = "as " + jump.what + (jump.is_of_a_joint ? " ends" : " jumps");
+    const bool is_touch = segment.event == EventKind::kTouch;
+    if (is_touch && jump.is_of_a_joint) AddJump(distance, place, what);
+    beside_jumps_.push_back({island_ != nullptr ? island_->InWhole(event) : event, distance,
+                             place.step, place.time, what, is_touch,
+                             is_touch && RestitutionOf(model, event).value > 0.0});
+  }
+}
+
+// What an event and a jump of the load leave at rest together has met them in either order: a slip
+// that has ended and does not begin again, an inelastic impact whose contact stays loaded. All else
+// has a derivative for each order.
+void RolloutCertifier::AddBesideJumps(const Model<double>& model, const Segment& segment) {
+  if (!(segment.length > 0.0)) return;
+  const ModelStructure& s = *model.structure;
+  const auto rests = [&](const BesideJump& beside, const ActiveContact& contact) {
+    if (contact.is_support) {
+      for (size_t k = 0; k < segment.before.supports.size(); ++k) {
+        if (s.supports[k].body == contact.a) {
+          return segment.before.supports[k].holds == SupportState::kBody;
+        }
+      }
+      return false;
+    }
+    for (size_t i = 0; i < segment.contacts.size(); ++i) {
+      const ActiveContact& other = segment.contacts[i];
+      if (!other.SameAs(contact)) continue;
+      if (SlidingSign(segment.modes[i]) != 0.0 && !beside.is_touch) return false;
+      return other.IsPureFriction() ||
+             std::any_of(loaded_.begin(), loaded_.end(),
+                         [&](const ActiveContact& one) { return one.SameAs(contact); });
+    }
+    return false;
+  };
+  std::erase_if(beside_jumps_, [&](const BesideJump& beside) {
+    const ActiveContact contact =
+        island_ != nullptr ? island_->InIsland(beside.contact) : beside.contact;
+    if (contact.a < 0 || contact.b < 0) return false;
+    if (beside.rebounds || !rests(beside, contact)) {
+      AddMargin(beside.distance, {&s, beside.step, beside.time, 0, &contact, ContactMode::kOpen},
+                beside.what);
+    }
+    return true;
+  });
+}
+
 // The event at the segment's end: whether it grazes, and what happens with it at once.
 void RolloutCertifier::AddEventOf(const Model<double>& model, long step,
                                   EventDerivative* derivative, Segment* segment) {
@@ -155,6 +228,7 @@ void RolloutCertifier::AddEventOf(const Model<double>& model, long step,
     if (segment->event == EventKind::kSlipEnds) {
       AddOtherSlips(model, *segment, place);
     }
+    AddJumpsOfLoads(model, *segment, place);
     if (EndsInMeeting(model, *segment) &&
         MeetsACorner(model, segment->after, segment->event_contact)) {
       AddJump(0.0, place, "a corner meets a corner");
@@ -249,6 +323,7 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
     start_ = nullptr;
   }
   AddSplits(model, step, *segment);
+  AddBesideJumps(model, *segment);
   if (!segment->starts && (step > 0 || segment->time > 0.0)) {
     AddClosedAtOnce(model, step, *segment);
   }
@@ -362,7 +437,9 @@ void RolloutCertifier::AddEnd(const Model<double>& model, long step, const Event
     const Segment& segment = record.parts[p]->segment;
     const double time = segment.time + segment.length;
     last = segment.length > 0.0 ? &segment : last;
-    if (segment.event == EventKind::kSlipEnds) add(time, segment.event_contact);
+    if (segment.event == EventKind::kSlipEnds || segment.event == EventKind::kSupportStops) {
+      add(time, segment.event_contact);
+    }
     if (segment.event == EventKind::kTouch && end - time < kNearJumpMargin * dt) {
       const double speed = SpeedsOf(model, segment.after, segment.event_contact).normal;
       if (speed < -Negligible(model, speed)) {
@@ -377,6 +454,16 @@ void RolloutCertifier::AddEnd(const Model<double>& model, long step, const Event
     const double after = SlipOf(model, last->after, last->contacts[i]);
     if (SlidingSign(last->modes[i]) != 0.0 && after < before) {
       add(last->time + last->length * (before / (before - after)), last->contacts[i]);
+    }
+  }
+  for (size_t k = 0; k < last->before.supports.size(); ++k) {
+    const SupportState& at = last->before.supports[k];
+    if (at.slow == SupportState::kNothing) continue;
+    const int support = static_cast<int>(k);
+    const double before = SupportProgress(model, last->before, support, at);
+    const double after = SupportProgress(model, last->after, support, at);
+    if (after < before) {
+      add(last->time + last->length * (before / (before - after)), ContactOfSupport(s, support));
     }
   }
   AddTouchesAtEnd(model, step, *last);

@@ -45,6 +45,15 @@ void ForEachWindowEdge(const ModelStructure& structure, const Visit& visit) {
   }
 }
 
+// Whether a signal's values before and from row k on differ.
+bool JumpsAt(const Signal& signal, size_t k) {
+  if (signal.interpolation != Signal::Interpolation::kConstant) return false;
+  const auto differs = [k](const std::vector<double>& column) {
+    return k < column.size() && column[k - 1] != column[k];
+  };
+  return differs(signal.x) || differs(signal.y) || differs(signal.value);
+}
+
 // Whether the edge is the end of a joint.
 bool IsRelease(const ModelStructure& s, const Edge& edge) {
   return std::any_of(s.joints.begin(), s.joints.end(), [&](const JointIndex& joint) {
@@ -126,6 +135,52 @@ EdgeGroup EdgesAt(const Model<double>& model, double time) {
                 if (!edge.gives_way && IsSameInstant(s, edge.time, time)) group.Add(edge);
               });
   return group;
+}
+
+std::vector<LoadJump> LoadJumpsWithin(const Model<double>& model, double from, double to) {
+  const ModelStructure& s = *model.structure;
+  std::vector<LoadJump> jumps;
+  const auto add = [&](double time, const std::vector<int>& bodies, const std::string& what) {
+    if (time >= from && time <= to) jumps.push_back({time, bodies, what, false});
+  };
+  const auto add_number = [&](int number, const std::vector<int>& bodies, const std::string& what) {
+    if (number >= 0) add(model.parameters[number], bodies, what);
+  };
+  const auto add_signal = [&](int index, const std::vector<int>& bodies, const std::string& what) {
+    if (index < 0) return;
+    const Signal& signal = s.signals[index];
+    for (size_t k = 1; k < signal.time.size(); ++k) {
+      if (JumpsAt(signal, k)) add(signal.time[k], bodies, what);
+    }
+  };
+  for (const ForceIndex& force : s.forces) {
+    add_number(force.start, {force.body}, "the window of force " + force.name);
+    add_number(force.end, {force.body}, "the window of force " + force.name);
+    add_signal(force.force_signal, {force.body}, "the signal of force " + force.name);
+    add_signal(force.torque_signal, {force.body}, "the signal of force " + force.name);
+  }
+  for (const JointIndex& joint : s.joints) {
+    const size_t before = jumps.size();
+    add_number(joint.until, {joint.a, joint.b}, "joint " + joint.name);
+    if (jumps.size() > before) jumps.back().is_of_a_joint = true;
+    add_signal(joint.effort_signal, {joint.a, joint.b}, "the effort of joint " + joint.name);
+  }
+  for (const ServoIndex& servo : s.servos) {
+    if (servo.joint >= 0) {
+      const JointIndex& joint = s.joints[servo.joint];
+      add_signal(servo.signal, {joint.a, joint.b}, "the target of joint " + joint.name);
+    } else {
+      const ForceIndex& force = s.forces[servo.force];
+      add_signal(servo.signal, {force.body}, "the target of force " + force.name);
+    }
+  }
+  ForEachKnot(model, from, to, [&](const Edge& edge) {
+    for (const PathIndex& path : s.paths) {
+      if (edge.gives_way || path.numbers + kPathDelay != edge.window.number) continue;
+      add(edge.time, {path.body}, "the speed of body " + s.bodies[path.body].name);
+    }
+  });
+  return jumps;
 }
 
 bool JumpPullsJoint(const Model<double>& model, double time) {

@@ -61,6 +61,18 @@ EdgeGroup NextEdges(const std::vector<Edge>& edges, double now, double rounding)
 /// The edges of windows and the knots at which a rate jumps, on a boundary of steps at `time`.
 EdgeGroup EdgesAt(const Model<double>& model, double time);
 
+/// A given time at which what acts on bodies jumps.
+struct LoadJump {
+  double time;
+  std::vector<int> bodies;
+  std::string what;            ///< "the window of force push"
+  bool is_of_a_joint = false;  ///< whether a joint ends, which an impact meets or not
+};
+
+/// The jumps of loads within [from, to]: windows of forces, steps of signals, ends of joints, and
+/// jumps of the rates of paths.
+std::vector<LoadJump> LoadJumpsWithin(const Model<double>& model, double from, double to);
+
 /// Adds to accelerations at a segment's state the loads (N, N, N m) by which its edges still to
 /// come differ from those passed: −F where a window opens, F where it closes.
 void AddEdgesToCome(const Model<double>& model, const Segment& segment,

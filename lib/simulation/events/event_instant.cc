@@ -112,9 +112,9 @@ bool EventStepper::AddInstant(const Model<double>& model, double t, EventKind ki
   segment.time = t;
   segment.length = 0.0;
   segment.starts = guess_.starts;
-  segment.middle = !is_after_edges                  ? JustBefore(model, t)
-                   : model.structure->paths.empty() ? t
-                                                    : JustAfter(model, t);
+  // A window is closed from its end on, not at it.
+  const bool has_edge = !model.structure->paths.empty() || EdgesAt(model, t).any;
+  segment.middle = !is_after_edges ? JustBefore(model, t) : has_edge ? JustAfter(model, t) : t;
   segment.before = *state;
   segment.event_number = -1;
   segment.at_once = false;
@@ -199,7 +199,19 @@ Segment* EventStepper::AddEdge(const Model<double>& model, double t, double midd
 void EventStepper::AddEdgesAtStart(const Model<double>& model, double t, const State<double>& state,
                                    StepReport* outcome) {
   if (guess_.starts) return;  // there is no motion before
-  const EdgeGroup edges = EdgesAt(model, t);
+  AddEdgesHere(model, t, EdgesAt(model, t), state, outcome);
+}
+
+bool EventStepper::PassEdges(const Model<double>& model, double t, const EdgeGroup& edges,
+                             State<double>* state, StepReport* outcome) {
+  AddEdgesHere(model, t, edges, *state, outcome);
+  ++outcome->events;
+  SetReleased(model, JustAfter(model, t), state);
+  return FollowAfter(model, t, state, outcome);
+}
+
+void EventStepper::AddEdgesHere(const Model<double>& model, double t, const EdgeGroup& edges,
+                                const State<double>& state, StepReport* outcome) {
   if (!edges.any) return;
   Segment* segment =
       AddEdge(model, t, JustBefore(model, std::min(edges.time, t)), {}, state, outcome);

@@ -746,6 +746,7 @@ StepReport EventStepper::Advance(const Model<double>& model, double t, double h,
   };
   bool at_given_time = true;
   bool begins = true;
+  EdgeGroup due;  // at the instant of the event that has ended the last motion
   if (!FollowAfter(model, t, state, &outcome)) return fail();
   while (end - now > kTimeRounding * h || !at_given_time) {
     const bool at_end = end - now <= kTimeRounding * h;
@@ -753,6 +754,10 @@ StepReport EventStepper::Advance(const Model<double>& model, double t, double h,
       return fail();
     }
     if (at_end) break;
+    if (const EdgeGroup passed = std::exchange(due, EdgeGroup()); passed.any) {
+      if (!PassEdges(model, now, passed, state, &outcome)) return fail();
+      continue;
+    }
     const EdgeGroup next = NextEdges(edges, now, kTimeRounding * h);
     const double goal = next.any ? next.time : end;
     const double until = now + std::ldexp(goal - now, -tries.halvings);
@@ -783,6 +788,7 @@ StepReport EventStepper::Advance(const Model<double>& model, double t, double h,
       continue;
     }
     now += segment.length;
+    if (next.any && next.time <= now + kTimeRounding * h) due = next;
     tries.halved_motions = 0;
     if (!TakeEvent(model, now, h, segment, state, &outcome)) {
       return fail();

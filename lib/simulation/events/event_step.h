@@ -184,6 +184,12 @@ class EventStepper {
   /// Those for edges of windows on the step's start.
   void AddEdgesAtStart(const Model<double>& model, double t, const State<double>& state,
                        StepReport* outcome);
+  /// Those for a group of edges at t.
+  void AddEdgesHere(const Model<double>& model, double t, const EdgeGroup& edges,
+                    const State<double>& state, StepReport* outcome);
+  /// Goes past edges at the instant of the event that has ended the last motion.
+  bool PassEdges(const Model<double>& model, double t, const EdgeGroup& edges, State<double>* state,
+                 StepReport* outcome);
   /// Those between the first and the further edges of a group that has been reached.
   void AddFurtherEdges(const Model<double>& model, double t, const EdgeGroup& edges,
                        const State<double>& state, StepReport* outcome);

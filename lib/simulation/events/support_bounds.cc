@@ -24,6 +24,21 @@ Vector2<T> ArmOfPoint(const Model<T>& model, const State<T>& state, const Suppor
   return state.PoseOf(support.body).rotation * Vector2<T>(at[0], at[1]);
 }
 
+// The largest progress (SupportProgress) at which what slows down has at most this speed.
+double ProgressOfSpeed(const Model<double>& model, const State<double>& state, int k,
+                       const SupportState& at, double speed) {
+  const SupportIndex& support = model.structure->supports[k];
+  if (support.kind == SupportIndex::kDisc) {
+    const double radius = model.parameters[support.numbers + SupportIndex::kRadius];
+    return speed * std::hypot(at.twist[0], at.twist[1], radius * at.twist[2]);
+  }
+  double sum = 0.0;
+  for (int i = 0; i < support.num_points; ++i) {
+    if (at.IsSlow(i)) sum += SpeedAtArm(ArmOfPoint(model, state, support, i), at.twist.data());
+  }
+  return speed * sum;
+}
+
 }  // namespace
 
 template <typename T>
@@ -101,6 +116,9 @@ void EventSearch::SearchStop(const Model<double>& model, int support, Event* eve
   double fa = SupportProgress(model, segment_->before, support, at);
   if (!(fa > 0.0)) return;
   const double tolerance = kLocatedOfSize * fa;
+  // At the end of the motion a speed that is rounding has reached 0: the next motion would take it
+  // for rest, and could not find the event.
+  const double at_end = ProgressOfSpeed(model, segment_->before, support, at, slow_);
   Event trial;
   trial.kind = EventKind::kSupportStops;
   trial.contact = ContactOfSupport(*model.structure, support);
@@ -111,7 +129,7 @@ void EventSearch::SearchStop(const Model<double>& model, int support, Event* eve
     const double b = share * whole;
     const double fb = value_of(*At(model, b));
     if (std::isnan(fb)) return;
-    if (fb <= tolerance) {
+    if (fb <= tolerance || (share == 1.0 && event->kind != trial.kind && fb <= at_end)) {
       trial.length = fb < -tolerance ? Refine(model, value_of, tolerance, a, fa, b, fb) : b;
       *event = trial;
       return;

@@ -320,6 +320,20 @@ TEST(EventCoincidencesTest, AForceBeginsAsADiscMeetsAFloorAndAWall) {
        {9, 2.0, {0.0, 0.0, -8.0}}});
 }
 
+// A force on a box ends as a disc elsewhere lands for the second time, on a step's end: the landing
+// leaves the box as it is, and the end of the force has its derivative.
+TEST(EventCoincidencesTest, AForceEndsAsADiscLandsElsewhere) {
+  ExpectExact(
+      Of("[0, -10]",
+         R"({"name": "disc", "shape": {"circle": {"radius": 0.125}}, "mass": 1, "restitution": 0.5,
+             "position": [0, 1.375]}, )" +
+             Floor(0.0) + R"(, {"name": "b", "mass": 2, "inertia": 1, "position": [9, 9]})",
+         1.2,
+         R"(, "forces": [{"name": "f", "body": "b", "force": [16, 20], "start": -1, "end": 1}])"),
+      {"bodies/disc/position/y", "forces/f/end"},
+      {{6, 9.0 + 4.0 + 1.6, {0.0, 1.6}}, {9, 8.0, {0.0, 8.0}}});
+}
+
 // A carriage on a rail with a cross slide, whose limits are met at one instant: each limit stops
 // its own coordinate through the joints.
 TEST(EventCoincidencesTest, TwoSlidersMeetTheirLimits) {
@@ -449,6 +463,79 @@ TEST(EventCoincidencesTest, StribecksFrictionStopsASlider) {
       scene,
       {"bodies/b/velocity/x", "bodies/b/mass", "joints/j/friction", "joints/j/stribeck_speed"},
       {{0, x, {mass * 0.5 * e, x / mass, -x, 2.0 * x - mass * 0.25 * e}}}, {0.01, 0.005, 0.007});
+}
+
+// A mass on a belt at the speed v that a spring k pulls back at F = k v t0, and the friction that
+// falls with the slip w, F_k + (F_s − F_k) e^(−(w / u)²): its place and speed at T, by steps of
+// fourth order from t0 on that are so short that their error is rounding.
+struct BeltEnd {
+  double x, v;
+};
+BeltEnd OnABelt(double limit, double kinetic, double k, double belt, double u, double duration) {
+  const double start = limit / (k * belt);
+  constexpr int kSteps = 20000;
+  const double h = (duration - start) / kSteps;
+  double x = limit / k, w = 0.0;
+  const auto rate = [&](double at, double slip) {
+    return -k * at + kinetic + (limit - kinetic) * std::exp(-slip * slip / (u * u));
+  };
+  for (int i = 0; i < kSteps; ++i) {
+    const double x1 = belt + w, w1 = rate(x, w);
+    const double x2 = x1 + 0.5 * h * w1, w2 = rate(x + 0.5 * h * x1, w + 0.5 * h * w1);
+    const double x3 = x1 + 0.5 * h * w2, w3 = rate(x + 0.5 * h * x2, w + 0.5 * h * w2);
+    const double x4 = x1 + h * w3, w4 = rate(x + h * x3, w + h * w3);
+    x += h * (x1 + 2.0 * x2 + 2.0 * x3 + x4) / 6.0;
+    w += h * (w1 + 2.0 * w2 + 2.0 * w3 + w4) / 6.0;
+  }
+  return {x, belt + w};
+}
+
+// It breaks loose at 0.5 s, on a step's end and within a step. The engine's motions have an error
+// of fourth order in dt, which an event on a step's end changes as it splits either step.
+TEST(EventCoincidencesTest, AMassOnABeltBreaksLoose) {
+  for (const double limit : {5.0, 4.5}) {
+    const double k = 100.0, belt = limit / (0.5 * k), u = 0.05, kinetic = 3.0, duration = 0.7;
+    std::ostringstream text;
+    text.precision(17);
+    text << R"({"gravity": [0, -9.81], "bodies": [
+        {"name": "belt", "kinematic": true, "position": [0, 0], "velocity": [)"
+         << belt << R"(, 0]},
+        {"name": "b", "mass": 1, "inertia": 1, "position": [0, 0], "velocity": [)"
+         << belt << R"(, 0]}],
+      "joints": [{"name": "f", "type": "prismatic", "bodies": ["b", "belt"], "anchor": [0, 0],
+                  "axis": [1, 0], "friction": )"
+         << limit << R"(, "kinetic_friction": 3, "stribeck_speed": 0.05}],
+      "springs": [{"name": "k", "bodies": ["b", "world"], "anchors": [[0, 0], [-1, 0]],
+                   "stiffness": 100, "rest_length": 1}],
+      "simulation": {"stepping": "event", "duration": 0.7}})";
+    Scene scene = SceneOf(text.str());
+    const BeltEnd end = OnABelt(limit, kinetic, k, belt, u, duration);
+    constexpr double kBeside = 1e-4;
+    const BeltEnd more = OnABelt(limit + kBeside, kinetic, k, belt, u, duration);
+    const BeltEnd less = OnABelt(limit - kBeside, kinetic, k, belt, u, duration);
+    const double dx = (more.x - less.x) / (2.0 * kBeside);
+    const double dv = (more.v - less.v) / (2.0 * kBeside);
+    for (const double dt : {0.002, 0.0025, 0.0017}) {
+      scene.simulation.dt = dt;
+      const std::vector<std::string> paths = {"joints/f/friction"};
+      for (const GradientMethod method : {GradientMethod::kTangent, GradientMethod::kAdjoint,
+                                          GradientMethod::kFiniteDifference}) {
+        const GradientResult result = testing::Jacobian(scene, paths, method);
+        const std::string what = "limit " + std::to_string(limit) + ", dt " + std::to_string(dt) +
+                                 ", method " + std::to_string(static_cast<int>(method));
+        EXPECT_NEAR(result.values[0], end.x, 1e-6) << what;
+        EXPECT_NEAR(result.jacobian(0, 0), dx, 1e-4 * std::abs(dx) + 1e-6) << what;
+        EXPECT_NEAR(result.jacobian(3, 0), dv, 1e-4 * std::abs(dv) + 1e-5) << what;
+      }
+      for (const DerivativeSide side : {DerivativeSide::kPlus, DerivativeSide::kMinus}) {
+        const GradientResult one =
+            FinalStateJacobian(scene, testing::Resolve(scene, paths),
+                               {.method = GradientMethod::kTangent, .side = side});
+        ASSERT_TRUE(one.done) << one.message << ", dt " << dt;
+        EXPECT_NEAR(one.jacobian(0, 0), dx, 1e-4 * std::abs(dx) + 1e-6) << dt;
+      }
+    }
+  }
 }
 
 // A disc slides off the end of a face and falls from there: y = y0 − g (T − t0)² / 2 with

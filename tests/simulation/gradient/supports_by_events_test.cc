@@ -60,6 +60,51 @@ TEST(SupportsByEventsTest, ABlockSlidesStraightAndStops) {
   }
 }
 
+// Up a tilted table and back: it turns at t = v / a1 = 0.5 s, on a step's end or within a step, and
+// is at v² / (2 a1) − a2 (T − t)² / 2 in the end, with a1 = g + μ N / m and a2 = g − μ N / m.
+TEST(SupportsByEventsTest, ABlockTurnsBackOnATiltedTable) {
+  for (const double mu : {0.25, 0.3, 0.125}) {
+    const double g = 8.0 - 8.0 * mu, a1 = 8.0, a2 = g - 8.0 * mu, rest = 0.4;
+    for (const double dt : {0.5, 0.25, 0.1, 0.05, 0.02, 0.01, 0.03, 0.007}) {
+      const Scene scene = TableByEvents(R"("inertia": 1, "position": [0, 0], "velocity": [4, 0],
+              "support": {"load": 16, "friction": )" +
+                                            std::to_string(mu) + "}",
+                                        dt, 0.9, std::to_string(-g) + ", 0");
+      const std::vector<std::string> paths = {"bodies/b/velocity/x", "bodies/b/support/friction"};
+      const GradientResult result = Jacobian(scene, paths, GradientMethod::kAdjoint);
+      EXPECT_NEAR(result.values[0], 1.0 - 0.5 * a2 * rest * rest, 1e-9) << dt;
+      EXPECT_NEAR(result.values[3], -a2 * rest, 1e-9) << dt;
+      // t changes by 1 / a1 with v, and by −8 t / a1 with μ.
+      EXPECT_NEAR(result.jacobian(0, 0), 0.5 + a2 * rest / a1, 1e-7) << dt;
+      EXPECT_NEAR(result.jacobian(3, 0), a2 / a1, 1e-7) << dt;
+      EXPECT_NEAR(result.jacobian(0, 1), -1.0 + 4.0 * rest * rest - 0.5 * a2 * rest, 1e-7) << dt;
+      EXPECT_EQ(result.certificate.verdict, "trustworthy") << dt;
+      ExpectOthersAgree(scene, paths, result);
+    }
+  }
+}
+
+// A run that ends as the support brings the body to rest: its speed has a derivative on each side.
+TEST(SupportsByEventsTest, ARunEndsAsABlockStops) {
+  for (const double dt : {0.5, 0.25, 0.1, 0.01, 0.03, 0.007}) {
+    const Scene scene = TableByEvents(R"("inertia": 1, "position": [0, 0], "velocity": [1, 0],
+            "support": {"load": 20, "friction": 0.2})",
+                                      dt, 0.5);
+    const std::vector<std::string> paths = {"bodies/b/velocity/x"};
+    const GradientResult both = Jacobian(scene, paths, GradientMethod::kTangent);
+    EXPECT_NE(both.certificate.verdict.find("the run ends as it stops sliding"), std::string::npos)
+        << both.certificate.verdict << ", dt " << dt;
+    EXPECT_NEAR(both.jacobian(0, 0), 0.5, 1e-7) << dt;
+    for (const DerivativeSide side : {DerivativeSide::kPlus, DerivativeSide::kMinus}) {
+      const GradientResult one =
+          FinalStateJacobian(scene, testing::Resolve(scene, paths),
+                             {.method = GradientMethod::kTangent, .side = side});
+      ASSERT_TRUE(one.done) << one.message << ", dt " << dt;
+      EXPECT_NEAR(one.jacobian(3, 0), side == DerivativeSide::kPlus ? 1.0 : 0.0, 1e-6) << dt;
+    }
+  }
+}
+
 // On a tilted table it stays exactly where gravity is within the cone, and slides beyond.
 TEST(SupportsByEventsTest, ATableThatIsTilted) {
   const std::string keys =
