@@ -277,12 +277,16 @@ class Judge {
     return "";
   }
 
-  // Whether the certificate has named a parameter as an edge of a force's window on a step's end.
+  // Whether the certificate has named a parameter as an edge of a force's window on a step's end,
+  // or at an end of the run.
   // The derivative of fixed steps there is the mean of those of two steps, each of which may pass
   // another kink on its own side: neither side need have the mean, even if both have the same.
   bool IsEdgeOfFixedSteps(int p) const {
+    const std::string& named = run_.named[p];
     return check_.stepping == Stepping::kFixed &&
-           run_.named[p].find("on a step's boundary") != std::string::npos;
+           (named.find("on a step's boundary") != std::string::npos ||
+            named.find("is the start of the run") != std::string::npos ||
+            named.find("is the end of the run") != std::string::npos);
   }
 
   void Except(int p, int pair, long entries, double error, const std::string& what, KindRow* row) {

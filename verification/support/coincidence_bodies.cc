@@ -27,21 +27,23 @@ Real InertiaOfDisc(const NumberAt& at, const std::string& body) {
 
 const std::vector<CoincidenceMaker::Element>& CoincidenceMaker::ElementsOf(Group group) {
   using Maker = CoincidenceMaker;
-  static const std::vector<Element> level = {{"slip ends", &Maker::SlipEnds},
-                                             {"slip begins", &Maker::SlipBegins},
-                                             {"slip begins at once", &Maker::SlipStartsAtOnce},
-                                             {"force window", &Maker::ForceWindow},
-                                             {"rolling", &Maker::Rolls},
-                                             {"touch", &Maker::Lands},
-                                             {"touch with a face", &Maker::LandsFlat},
-                                             {"lift-off", &Maker::LiftsOff},
-                                             {"slip ends in an impact", &Maker::SlipEndsInAnImpact},
-                                             {"feature change", &Maker::PassesASeam},
-                                             {"feature change, off a face", &Maker::LeavesAFace},
-                                             {"joint friction ends", &Maker::JointStops},
-                                             {"Stribeck, begins", &Maker::StribeckBreaksLoose},
-                                             {"Stribeck, ends", &Maker::StribeckStops},
-                                             {"slow Stribeck, ends", &Maker::SlowStribeckStops}};
+  static const std::vector<Element> level = {
+      {"slip ends", &Maker::SlipEnds},
+      {"slip begins", &Maker::SlipBegins},
+      {"slip begins at once", &Maker::SlipStartsAtOnce},
+      {"slip ends as a force begins", &Maker::SlipEndsAsAForceBegins},
+      {"force window", &Maker::ForceWindow},
+      {"rolling", &Maker::Rolls},
+      {"touch", &Maker::Lands},
+      {"touch with a face", &Maker::LandsFlat},
+      {"lift-off", &Maker::LiftsOff},
+      {"slip ends in an impact", &Maker::SlipEndsInAnImpact},
+      {"feature change", &Maker::PassesASeam},
+      {"feature change, off a face", &Maker::LeavesAFace},
+      {"joint friction ends", &Maker::JointStops},
+      {"Stribeck, begins", &Maker::StribeckBreaksLoose},
+      {"Stribeck, ends", &Maker::StribeckStops},
+      {"slow Stribeck, ends", &Maker::SlowStribeckStops}};
   static const std::vector<Element> steep = {{"reversal", &Maker::SlipEnds},
                                              {"slip begins at once", &Maker::SlipStartsAtOnce}};
   static const std::vector<Element> shallow = {{"slip ends", &Maker::SlipEnds}};
@@ -201,6 +203,24 @@ void CoincidenceMaker::ForceWindow() {
   push.start = at_;
   push.end = (count_ + random_.Integer(1, 2)) * dt;
   for (const char* what : {"/force/x", "/start", "/end"}) {
+    paths_.push_back("forces/" + push.name + what);
+  }
+  SlideBox(name, nullptr);
+}
+
+void CoincidenceMaker::SlipEndsAsAForceBegins() {
+  BasicBody<double>& box = AddBox();
+  const std::string name = box.name;
+  const double friction = Pick({0.5, 0.25, 0.2});
+  box.velocity.x() = mirror_ * friction * gravity_ * at_;
+  const double limit = friction * box.mass * gravity_;
+  AddPair(name, friction, 0.0);
+  BasicForce<double>& push = AddForce(name);
+  // It slides on, turns, or stays where it has stopped.
+  push.force.x() = mirror_ * Pick({2.0, -2.0, 0.5, -0.5}) * limit;
+  push.start = at_;
+  push.end = 1000.0;
+  for (const char* what : {"/force/x", "/start"}) {
     paths_.push_back("forces/" + push.name + what);
   }
   SlideBox(name, nullptr);

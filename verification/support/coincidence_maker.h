@@ -68,6 +68,7 @@ class CoincidenceMaker {
   void SlipEnds();
   void SlipBegins();
   void SlipStartsAtOnce();
+  void SlipEndsAsAForceBegins();
   void ForceWindow();
   void FreeForceWindow();
   void SignalCorner();
