@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <limits>
 
+#include "tangible/app/control_schema.h"
 #include "tangible/app/program.h"
 #include "tangible/app/tolerances.h"
 #include "tangible/scene/csv.h"
@@ -18,8 +19,8 @@ namespace {
 
 // Steps of a plan or a run: each has controls, and a plan has Jacobians of each.
 constexpr double kMostSteps = 1e7;
-// Each start is a plan in memory, each sample its controls.
-constexpr int kMostStarts = 10000, kMostSamples = 100000;
+// Each sample is its controls in memory.
+constexpr int kMostSamples = 100000;
 constexpr int kDefaultSamples = 64;
 
 // The duration of a problem, which is rounded up to whole steps of dt, s.

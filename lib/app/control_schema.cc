@@ -6,7 +6,7 @@
 namespace tangible {
 namespace {
 
-constexpr int kMost = 1000000, kMostStarts = 10000;
+constexpr int kMost = 1000000;
 
 OrderedJson ControlSchemaOfOne() {
   const OrderedJson number = SchemaOfNumber(NumberKind::kFree);

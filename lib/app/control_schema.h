@@ -7,6 +7,9 @@
 
 namespace tangible {
 
+/// Each start is a plan in memory.
+inline constexpr int kMostStarts = 10000;
+
 /// A schema that every control problem that is read satisfies (json_schema.h).
 OrderedJson ControlSchema();
 

@@ -152,8 +152,8 @@ std::string Band(const std::vector<Point>& run, const Axis& x, const Axis& y) {
   return path + "Z";
 }
 
-std::string Curve(const PlotSeries& series, const std::string& colour, const Axis& x,
-                  const Axis& y) {
+std::string SeriesCurve(const PlotSeries& series, const std::string& colour, const Axis& x,
+                        const Axis& y) {
   const std::vector<Point> points = PointsOf(series);
   std::string svg = "<g class=\"" + colour + "\">\n";
   if (series.style != PlotStyle::kPoints) {
@@ -368,7 +368,7 @@ std::string PlotSvg(const PlotOptions& options, const std::vector<PlotSeries>& s
   svg += legend.svg;
   svg += Axes(options, x, y);
   for (std::size_t i = 0; i < series.size(); ++i) {
-    svg += Curve(series[i], "s" + std::to_string(i % kNumColours), x, y);
+    svg += SeriesCurve(series[i], "s" + std::to_string(i % kNumColours), x, y);
   }
   return svg + "</svg>\n";
 }

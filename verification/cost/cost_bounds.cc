@@ -10,7 +10,6 @@ namespace tangible::cost {
 namespace {
 
 constexpr int kBoundedParameters = 8;
-constexpr double kMebibyte = 1048576.0;
 
 // The largest ratio of a method's cells with at most this many parameters.
 CheckedBound LargestRatio(const std::string& what, double limit, CostMethod method,

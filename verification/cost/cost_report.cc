@@ -12,7 +12,6 @@
 namespace tangible::cost {
 namespace {
 
-constexpr double kMebibyte = 1048576.0;
 constexpr int kNameWidth = 21;
 constexpr int kCellWidth = 13;
 constexpr int kPlotHeight = 420;

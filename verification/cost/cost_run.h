@@ -27,6 +27,9 @@ enum class CostMethod {
 };
 inline constexpr int kNumCostMethods = 8;
 
+/// Bytes, in which memory is shown and limited.
+inline constexpr double kMebibyte = 1048576.0;
+
 /// "adjoint", "implicit Jets", ...
 const char* NameOf(CostMethod method);
 

@@ -43,8 +43,8 @@ using cost::CostCell;
 using cost::CostMethod;
 using cost::CostOptions;
 using cost::Crossover;
+using cost::kMebibyte;
 
-constexpr double kMebibyte = 1048576.0;
 constexpr int kMostParameters = 4096;
 constexpr int kMostSteps = 1000000;
 

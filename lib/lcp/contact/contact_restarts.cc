@@ -20,7 +20,7 @@ namespace {
 
 // From this round on a path that has not converged may be cycling, and takes the values of
 // kRegularisationAgainstCycling in turn.
-constexpr int kCyclingRound = 8;
+constexpr int kCyclingRestart = 8;
 // Number of restarts, and of proximal steps of each (those that converge need up to 4). The limit
 // of pivots is a multiple of the number of contacts, which is raised by one after every few
 // restarts. The limit of all factorisations together is a multiple of the number of contacts, and
@@ -102,8 +102,8 @@ bool ContactSolver::SolveByPivoting(const ContactProblem<double>& problem,
       ++report->fallbacks.extrapolation;
     }
     last_residual = report->residual;
-    regularisation = round < kCyclingRound ? std::max(kLeastRegularisation, 0.1 * regularisation)
-                                           : kRegularisationAgainstCycling[round % 3];
+    regularisation = round < kCyclingRestart ? std::max(kLeastRegularisation, 0.1 * regularisation)
+                                             : kRegularisationAgainstCycling[round % 3];
   }
   return false;
 }
