@@ -90,6 +90,12 @@ function(tangible_unite target)
   endif()
 endfunction()
 
+# What reads, writes, draws and compares, and does not compute for long: with -O1 it compiles in half of the time of -O3
+# (sources of lib/scene: 24 s for 48).
+function(tangible_compile_quickly target)
+  target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1>)
+endfunction()
+
 # Everything that the tests labelled unit or program need, and nothing else.
 add_custom_target(tangible_unit_and_program_tests)
 
@@ -104,14 +110,14 @@ function(tangible_module_folder name)
   file(CREATE_LINK "${CMAKE_CURRENT_SOURCE_DIR}" "${TANGIBLE_INCLUDE_DIR}/tangible/${name}" SYMBOLIC)
 endfunction()
 
-# tangible_module(<name> [INTERNAL] [NO_PRECOMPILE] [SOURCES file...] [HEADERS file...] [DEPENDS module...]
+# tangible_module(<name> [INTERNAL] [NO_PRECOMPILE] [QUICK] [SOURCES file...] [HEADERS file...] [DEPENDS module...]
 #                 [LINK target...])
 # The library of the current folder. A name is `scene` or, for a sub-folder, `lcp/dense`: target
 # tangible_lcp_dense, alias tangible::lcp_dense. A module without sources is an INTERFACE library.
 # DEPENDS is the only way to the symbols of another module's headers. INTERNAL modules are not installed.
-# NO_PRECOMPILE: what it links brings compiler options of its own.
+# NO_PRECOMPILE: what it links brings compiler options of its own. QUICK: see tangible_compile_quickly.
 function(tangible_module name)
-  cmake_parse_arguments(MODULE "INTERNAL;NO_PRECOMPILE" "" "SOURCES;HEADERS;DEPENDS;LINK;PRIVATE_LINK" ${ARGN})
+  cmake_parse_arguments(MODULE "INTERNAL;NO_PRECOMPILE;QUICK" "" "SOURCES;HEADERS;DEPENDS;LINK;PRIVATE_LINK" ${ARGN})
   tangible_target_name(${name} short_name)
   if(NOT name MATCHES "/")
     tangible_module_folder(${name})
@@ -123,6 +129,9 @@ function(tangible_module name)
     target_link_libraries(${target} PRIVATE $<BUILD_INTERFACE:tangible_flags> ${MODULE_PRIVATE_LINK})
     if(NOT MODULE_NO_PRECOMPILE)
       tangible_precompile(${target})
+    endif()
+    if(MODULE_QUICK)
+      tangible_compile_quickly(${target})
     endif()
     add_dependencies(tangible_unit_and_program_tests ${target})
     tangible_unite(${target})
