@@ -187,7 +187,9 @@ void RolloutCertifier::AddBesideJumps(const Model<double>& model, const Segment&
     if (contact.is_support) {
       for (size_t k = 0; k < segment.before.supports.size(); ++k) {
         if (s.supports[k].body == contact.a) {
-          return segment.before.supports[k].holds == SupportState::kBody;
+          const int holds = segment.before.supports[k].holds;
+          return holds == SupportState::kBody ||
+                 (holds != SupportState::kNothing && s.supports[k].kind == SupportIndex::kCentre);
         }
       }
       return false;
@@ -206,6 +208,8 @@ void RolloutCertifier::AddBesideJumps(const Model<double>& model, const Segment&
     const ActiveContact contact =
         island_ != nullptr ? island_->InIsland(beside.contact) : beside.contact;
     if (contact.a < 0 || contact.b < 0) return false;
+    // A motion from the event to the jump tells nothing of what comes after it.
+    if (!(segment.length > 2.0 * beside.distance * s.settings.dt)) return false;
     if (beside.rebounds || !rests(beside, contact)) {
       AddMargin(beside.distance, {&s, beside.step, beside.time, 0, &contact, ContactMode::kOpen},
                 beside.what);

@@ -6,7 +6,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "../../support/gradients.h"
@@ -151,6 +153,36 @@ TEST(CoincidentLoadsTest, AJointEndsAsItsBodyMeetsAWall) {
     EXPECT_TRUE(std::abs(result.values[6] - 0.575) < 1e-9 ||
                 std::abs(result.values[6] - 0.95) < 1e-9)
         << result.values[6] << ", dt " << dt;
+  }
+}
+
+// A push that friction holds, and one on a disc that lands without a rebound, find what rests in
+// either order.
+TEST(CoincidentLoadsTest, WhatStaysAtRestIsNotNamed) {
+  const Scene held =
+      SceneOf(Block(R"("forces": [{"name": "f", "body": "b", "force": [1, 0], "start": 0.5}])"));
+  const Scene supported = SceneOf(R"({"gravity": [0, 0], "bodies": [
+      {"name": "b", "mass": 1, "inertia": 1, "position": [0, 0], "velocity": [1, 0],
+       "support": {"friction": 0.2, "load": 10}}],
+      "forces": [{"name": "f", "body": "b", "force": [1, 0], "start": 0.5}],
+      "simulation": {"stepping": "event", "duration": 0.75}})");
+  const Scene landed = SceneOf(R"({"gravity": [0, -10], "bodies": [
+      {"name": "b", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0, 1.35],
+       "velocity": [1, 0]},
+      {"name": "floor", "static": true, "shape": {"half_plane": {"normal": [0, 1]}}}],
+      "forces": [{"name": "f", "body": "b", "force": [0, 4], "start": 0.5}],
+      "simulation": {"stepping": "event", "duration": 0.75}})");
+  for (const auto& [of, exact] : {std::pair(held, 0.5), {supported, 0.5}, {landed, 0.75}}) {
+    for (const double dt : kSteps) {
+      Scene scene = of;
+      scene.simulation.dt = dt;
+      for (const GradientMethod method : {GradientMethod::kTangent, GradientMethod::kAdjoint,
+                                          GradientMethod::kFiniteDifference}) {
+        const GradientResult result = testing::Jacobian(scene, {"bodies/b/velocity/x"}, method);
+        EXPECT_EQ(result.certificate.verdict, "trustworthy") << exact << ", dt " << dt;
+        EXPECT_NEAR(result.jacobian(0, 0), exact, 1e-5) << exact << ", dt " << dt;
+      }
+    }
   }
 }
 
