@@ -108,7 +108,7 @@ ContactSolverReport DecompressionSolver::Solve(const ContactSolverOptions& optio
   }
   if (problem->has_rolling) return finish();
   report.fallbacks.dense += FitsDensePortfolio(*problem) ? 1 : 0;
-  if (SolveContactsDense(*problem, options.tolerance, solution, &report.iterations)) {
+  if (SolveContactsDense(*problem, options, solution, &report.iterations)) {
     for (size_t i = 0; i < problem->contacts.size(); ++i) {
       ContactBlock<double>& contact = problem->contacts[i];
       contact.driven = contact.offset > 0.0 && solution->normal_impulse[i] <= contact.offset;

@@ -175,16 +175,17 @@ bool FitsDensePortfolio(const ContactProblem<double>& problem) {
   return Fits(problem, kMaxPortfolioRows);
 }
 
-bool SolveContactsDense(const ContactProblem<double>& problem, double tolerance,
+bool SolveContactsDense(const ContactProblem<double>& problem, const ContactSolverOptions& options,
                         ContactSolution<double>* solution, int* iterations) {
   *iterations = 0;
   if (!FitsDensePortfolio(problem)) {
     return false;
   }
   const MixedLcp<double> dense = DenseProblem(problem);
-  LcpOptions options;
-  options.tolerance = tolerance;
-  const LcpSolution<double> result = SolveLcp(dense, options);
+  LcpOptions attempts;
+  attempts.tolerance = options.tolerance;
+  attempts.further_attempts = options.last_resort;
+  const LcpSolution<double> result = SolveLcp(dense, attempts);
   *iterations = result.iterations;
   if (result.status != LcpStatus::kSolved) {
     return false;

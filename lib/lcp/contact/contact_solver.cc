@@ -19,8 +19,8 @@ constexpr int kFewContradicted = 2;
 constexpr int kPivotsFromGuess = 40;
 constexpr int kPivotsFromInteriorPoint = 2;
 constexpr int kPivotsFromOpen = 20;
-// Up to this many contacts the dense portfolio takes milliseconds.
-constexpr size_t kFewContacts = 8;
+// Up to this many contacts the first attempts of the dense portfolio take milliseconds.
+constexpr size_t kFewContacts = 20;
 // Maximum number of proximal steps at a path's end.
 constexpr int kMaxProximalRounds = 40;
 // Contacts whose modes have been changed this often are changed one at a time, the worst first.
@@ -310,7 +310,7 @@ bool ContactSolver::SolveByLemke(const ContactProblem<double>& problem,
     }
     ++report->fallbacks.dense;
     report->rung = Rung::kDense;
-    const bool dense = SolveContactsDense(problem, options.tolerance, solution, &iterations);
+    const bool dense = SolveContactsDense(problem, options, solution, &iterations);
     report->iterations += iterations;
     return dense && Polish(problem, options, solution, report);
   };
@@ -318,6 +318,7 @@ bool ContactSolver::SolveByLemke(const ContactProblem<double>& problem,
     report->rung = Rung::kRestarts;
     return SolveByRestarts(problem, options, solution, report);
   };
+  if (!options.last_resort) return problem.contacts.size() <= kFewContacts && by_dense();
   // The cheaper method comes first.
   return problem.contacts.size() <= kFewContacts ? by_dense() || by_restarts()
                                                  : by_restarts() || by_dense();

@@ -66,6 +66,9 @@ struct ContactSolverOptions {
   SolverChoice choice = SolverChoice::kAuto;
   double tolerance = kLcpTolerance;  ///< largest scaled natural residual
   int max_iterations = 100;          ///< limit of iterations of the interior point
+  /// Whether restarts, and further attempts of the dense portfolio, follow all else. They take most
+  /// of a second, and few problems need them.
+  bool last_resort = true;
 };
 
 /// Counts of the methods that were needed beyond changes of the guess's modes. A method that the
@@ -173,9 +176,9 @@ class ContactSolver {
 /// form (4 for each contact with friction, else 1), and 1000 unknowns of bodies and joints.
 bool FitsDensePortfolio(const ContactProblem<double>& problem);
 
-/// The dense portfolio (solver.h) with its further attempts, on the one-sided form; false where it
-/// fails or does not fit.
-bool SolveContactsDense(const ContactProblem<double>& problem, double tolerance,
+/// The dense portfolio (solver.h) on the one-sided form, with its further attempts where they are
+/// the last resort; false where it fails or does not fit.
+bool SolveContactsDense(const ContactProblem<double>& problem, const ContactSolverOptions& options,
                         ContactSolution<double>* solution, int* iterations);
 
 /// Whether a checked Farkas vector says that no impulses satisfy the contacts' inequalities; false

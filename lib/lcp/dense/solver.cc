@@ -261,6 +261,7 @@ bool RunPortfolio(Portfolio& portfolio, const LcpOptions& options, Index nz) {
   if (interior_point && portfolio.TryInteriorPoint()) return true;
   if (lemke && portfolio.TryLemke(VectorXd())) return true;
   if (portfolio.ProveInfeasible()) return false;
+  if (!options.further_attempts) return false;
   if (lemke && TryLemkes(portfolio, nz)) return true;
   return options.solver == SolverChoice::kAuto && portfolio.TryEnumeration();
 }

@@ -19,6 +19,9 @@ struct LcpOptions {
   SolverChoice solver = SolverChoice::kAuto;
   double tolerance = kLcpTolerance;  ///< largest scaled residual of a solution
   int max_iterations = 100;          ///< of each interior-point run
+  /// Whether proximal steps, other covering vectors and enumeration follow the first attempts. They
+  /// cost a hundred times as much.
+  bool further_attempts = true;
 };
 
 /// Solves the problem, or reports why not. Data of wrong shape or not finite are refused: status

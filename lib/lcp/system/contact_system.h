@@ -162,6 +162,11 @@ class ContactSystem {
   double Refine(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes,
                 Regularisation regularisation, const FreeMomenta& free, double* x, int columns,
                 double goal);
+  // Solves for rhs_ with the whole system and less δ; infinite, with the condensed system, where
+  // rows contradict each other all the same.
+  double SolveWhole(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes,
+                    const FreeMomenta& free, double* x, int columns);
+  bool Squeezes(const ContactProblem<double>& problem, const double* x, int columns) const;
   // Refines a column further by conjugate residuals, from its residual in `scratch`.
   template <bool kTransposed>
   void RefineConjugate(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes,

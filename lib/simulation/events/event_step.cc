@@ -20,10 +20,6 @@ constexpr double kForcedSlip = 1e4;
 // How often it is made that many times larger where a light body between heavy ones is accelerated
 // more by the friction of its contacts.
 constexpr int kMostForced = 3;
-// How often a motion is halved that cannot be integrated over the rest of a step.
-constexpr int kMostHalvings = 14;
-// How many such shortened motions a step may have. Those of a stiff body would not end.
-constexpr int kMostShortened = 50;
 // How often dt is halved for motions that ellipses shorten, and how many a contact may have in a
 // step: a flat side of 1e-9 of the length of an ellipse takes 2000.
 constexpr int kMostEllipseHalvings = 40;
@@ -440,8 +436,11 @@ bool EventStepper::ChooseContactModes(const Model<double>& model, double slow,
   AddEdgesToCome(model, *segment, &problem);
   ContactSolution<double> solution;
   GuessModes(segment->contacts, slip, slow, &problem, &solution);
-  ContactSolverReport solved = solver_.Solve(problem, SolverOptionsOf(settings), &solution);
+  ContactSolverOptions options = SolverOptionsOf(settings);
+  options.last_resort = unsolved_ == 0;
+  ContactSolverReport solved = solver_.Solve(problem, options, &solution);
   CountSolve(solved, outcome);
+  unsolved_ += solved.solved ? 0 : 1;
   double forced = 1.0;
   for (int k = 0;
        k < kMostForced && solved.solved && !OpposesSlips(problem, solution.modes, slip, slow);
@@ -456,7 +455,7 @@ bool EventStepper::ChooseContactModes(const Model<double>& model, double slow,
       const double c_t = own.contacts[i].c_t;
       problem.contacts[i].c_t = c_t + forced * (problem.contacts[i].c_t - c_t);
     }
-    solved = solver_.Solve(problem, SolverOptionsOf(settings), &solution);
+    solved = solver_.Solve(problem, options, &solution);
     CountSolve(solved, outcome);
   }
   const bool holds_unsolved = holds_ == Holds::kUnsolved && !solved.solved &&
@@ -657,11 +656,6 @@ bool EventStepper::TakeEvent(const Model<double>& model, double now, double h,
          AddHandOvers(model, now, segment, state, outcome);
 }
 
-bool EventStepper::Tries::Halve() {
-  halved_motions += halvings == 0 ? 1 : 0;
-  return ++halvings <= kMostHalvings && halved_motions <= kMostShortened;
-}
-
 // Chooses the modes of `segment`, the last part of the record, and moves along it. What cannot be
 // moved is taken out of the record again and tried in another way: with the contacts that a start
 // has released kept closed, after a short step with impulses, or over half the time.
@@ -730,6 +724,7 @@ StepReport EventStepper::Advance(const Model<double>& model, double t, double h,
   record_.Clear();
   guess_.located = 0;
   released_.clear();
+  unsolved_ = 0;
   counts_.Clear();
   shortened_.Clear();
   search_.StartStep(model, t, h, *state);

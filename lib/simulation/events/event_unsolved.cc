@@ -9,6 +9,19 @@
 #include "tangible/simulation/events/tolerances.h"
 
 namespace tangible {
+namespace {
+
+// How often a motion is halved that cannot be integrated over the rest of a step.
+constexpr int kMostHalvings = 14;
+// How many such shortened motions a step may have. Those of a stiff body would not end.
+constexpr int kMostShortened = 50;
+
+}  // namespace
+
+bool EventStepper::Tries::Halve() {
+  halved_motions += halvings == 0 ? 1 : 0;
+  return ++halvings <= kMostHalvings && halved_motions <= kMostShortened;
+}
 
 bool EventStepper::SolveByShortStep(const Model<double>& model, double t, double dt,
                                     State<double>* state, StepReport* outcome) {
@@ -25,8 +38,9 @@ bool EventStepper::SolveByShortStep(const Model<double>& model, double t, double
   impulses.restitution.assign(touching_.contacts.size(), CoefficientSource());
   AssembleImpulses(model, &assembly_, &impulses);
   SizeGuess(impulses.problem, &impulses.solution);
-  const ContactSolverReport solved = solver_.Solve(
-      impulses.problem, SolverOptionsOf(model.structure->settings), &impulses.solution);
+  ContactSolverOptions options = SolverOptionsOf(model.structure->settings);
+  options.last_resort = unsolved_ <= 1;
+  const ContactSolverReport solved = solver_.Solve(impulses.problem, options, &impulses.solution);
   CountSolve(solved, outcome);
   ++outcome->given_up.short_steps;
   ++outcome->events;

@@ -95,7 +95,7 @@ TEST(ContactLemkeTest, LargeProblemsAreLeftToOtherMethods) {
     EXPECT_EQ(solution.modes[0] != ContactMode::kOpen, c.lemke);
     EXPECT_EQ(FitsDensePortfolio(p), c.portfolio) << c.bodies;
     if (!c.portfolio) {
-      EXPECT_FALSE(SolveContactsDense(p, 1e-10, &solution, &iterations));
+      EXPECT_FALSE(SolveContactsDense(p, {}, &solution, &iterations));
       EXPECT_EQ(iterations, 0);
     }
     EXPECT_FALSE(ContactsProvedInfeasible(p));

@@ -153,6 +153,32 @@ TEST(PilesByEventsTest, DiscsThatJustFitBetweenWallsComeToRest) {
   }
 }
 
+// The same on places that people write: rows that depend on each other to a millionth, with impulses
+// that squeeze the discs a million times harder than they weigh, are solved by the whole system. The
+// condensed one squares that millionth: of these runs it left 27 solves to the last methods.
+TEST(PilesByEventsTest, DiscsThatJustFitOnRoundPlacesNeedNoLastMethods) {
+  constexpr int kDiscs = 5;
+  Scene scene = Empty(Integrator::kRungeKutta4, 3.0);
+  scene.bodies.push_back(Wall("left", 1.0, 0.0, -0.1 * kDiscs));
+  scene.bodies.push_back(Wall("right", -1.0, 0.0, -0.1 * kDiscs));
+  for (int i = 0; i < kDiscs; ++i) {
+    scene.bodies.push_back(Moving("disc" + std::to_string(i), {ShapeType::kCircle, {0.1}},
+                                  0.2 * i - 0.4, 0.15 + 0.05 * (3 * i % kDiscs)));
+  }
+  for (BasicBody<double>& body : scene.bodies) {
+    body.friction = 0.1;
+    body.restitution = 0.8;
+  }
+  const Fallen run = RunOf(scene);
+  ASSERT_EQ(run.report.status, StepStatus::kDone) << run.report.message;
+  EXPECT_GT(run.report.solver.whole_system, 0);
+  EXPECT_EQ(run.report.solver.interior_point, 0);
+  EXPECT_EQ(run.report.solver.dense, 0);
+  EXPECT_EQ(run.report.solver.restarts, 0);
+  EXPECT_LE(run.deepest, 1e-9);
+  EXPECT_LE(run.energy, 1e-12);
+}
+
 // Bodies of every shape with little or much friction and restitution, by either law of impact.
 TEST(PilesByEventsTest, ShapesThatFallInHeapsRun) {
   std::mt19937_64 random(11);
