@@ -437,10 +437,9 @@ bool EventStepper::ChooseContactModes(const Model<double>& model, double slow,
   ContactSolution<double> solution;
   GuessModes(segment->contacts, slip, slow, &problem, &solution);
   ContactSolverOptions options = SolverOptionsOf(settings);
-  options.last_resort = unsolved_ == 0;
+  options.last_resort = !limited_;
   ContactSolverReport solved = solver_.Solve(problem, options, &solution);
   CountSolve(solved, outcome);
-  unsolved_ += solved.solved ? 0 : 1;
   double forced = 1.0;
   for (int k = 0;
        k < kMostForced && solved.solved && !OpposesSlips(problem, solution.modes, slip, slow);
@@ -677,6 +676,11 @@ EventStepper::Tried EventStepper::TryMotion(const Model<double>& model, double n
     if (!released_.empty()) return keep_starts();
     record_.num_parts = parts;
     if (std::exchange(tries->short_step, true)) {
+      if (std::exchange(limited_, false)) {
+        tries->short_step = false;
+        outcome->message.clear();
+        return Tried::kAgain;
+      }
       if (!tries->unsolved.empty()) outcome->message = tries->unsolved;
       return Tried::kFailed;
     }
@@ -724,7 +728,7 @@ StepReport EventStepper::Advance(const Model<double>& model, double t, double h,
   record_.Clear();
   guess_.located = 0;
   released_.clear();
-  unsolved_ = 0;
+  limited_ = false;
   counts_.Clear();
   shortened_.Clear();
   search_.StartStep(model, t, h, *state);
@@ -761,6 +765,7 @@ StepReport EventStepper::Advance(const Model<double>& model, double t, double h,
     if (tried == Tried::kFailed) return fail();
     if (tried == Tried::kAgain) continue;
     if (Releases(model, segment)) continue;
+    limited_ = limited_ || tries.short_step;
     tries.short_step = false;
     tries.held = false;
     tries.unsolved.clear();

@@ -262,9 +262,9 @@ class EventStepper {
   /// solution, or always.
   enum class Holds { kNone, kUnsolved, kAll };
   Holds holds_ = Holds::kNone;
-  /// How many accelerations of this step were not found: for others the last resorts are not tried
-  /// again.
-  int unsolved_ = 0;
+  /// Accelerations were not found once in this step: the last resorts of others follow only where
+  /// nothing else helps.
+  bool limited_ = false;
   /// Contacts at their limit as the next motion starts, beyond which they would go in it: the
   /// accelerations at the start do not tell that they slide or open.
   std::vector<EndingSlip> released_;

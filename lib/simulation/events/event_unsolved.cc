@@ -39,7 +39,7 @@ bool EventStepper::SolveByShortStep(const Model<double>& model, double t, double
   AssembleImpulses(model, &assembly_, &impulses);
   SizeGuess(impulses.problem, &impulses.solution);
   ContactSolverOptions options = SolverOptionsOf(model.structure->settings);
-  options.last_resort = unsolved_ <= 1;
+  options.last_resort = !limited_;
   const ContactSolverReport solved = solver_.Solve(impulses.problem, options, &impulses.solution);
   CountSolve(solved, outcome);
   ++outcome->given_up.short_steps;
