@@ -40,6 +40,59 @@ def test_the_gradient_of_a_bounce_is_that_of_the_physics(scene: dict[str, Any]) 
         assert found.certificate["verdict"] == "trustworthy"
 
 
+def test_a_puck_slides_to_rest_on_a_table_seen_from_above() -> None:
+    puck = {
+        "name": "puck",
+        "shape": {"circle": {"radius": 0.04}},
+        "mass": 0.2,
+        "position": [0, 0],
+        "velocity": [1.2, 0],
+        "support": {"friction": 0.2},
+    }
+    settings = {"stepping": "event", "dt": 0.01, "duration": 1.0}
+    scene = {"gravity": [0, 0], "bodies": [puck], "simulation": settings}
+    rollout = tangible.Rollout(scene, ["bodies/puck/support/friction", "bodies/puck/velocity/x"])
+    slows = 0.2 * 9.81
+    way = 1.2**2 / (2.0 * slows)
+    for method in METHODS:
+        found = rollout.jacobian(method=method)
+        assert found.states[:3] == pytest.approx([way, 0.0, 0.0], abs=1e-9)
+        assert found.parameters[0] == pytest.approx([-way / 0.2, 1.2 / slows], abs=1e-6)
+        assert found.certificate["verdict"] == "trustworthy"
+
+
+def test_a_wheel_rolls_to_rest() -> None:
+    wheel = {
+        "name": "wheel",
+        "shape": {"circle": {"radius": 0.1}},
+        "mass": 2.0,
+        "position": [0, 0.1],
+        "velocity": [0.5, 0],
+        "angular_velocity": -5.0,
+        "friction": 0.5,
+        "rolling_friction": 0.002,
+    }
+    floor = {
+        "name": "floor",
+        "static": True,
+        "shape": {"half_plane": {"normal": [0, 1]}},
+        "friction": 0.5,
+        "rolling_friction": 0.002,
+    }
+    settings = {"stepping": "event", "dt": 0.02, "duration": 5.0}
+    rollout = tangible.Rollout(
+        {"bodies": [wheel, floor], "simulation": settings}, ["bodies/*/rolling_friction"]
+    )
+    # Half of m r^2 is the inertia, so that (3/2) m r a = rho m g.
+    slows = 0.002 * 9.81 / (1.5 * 0.1)
+    way = 0.5**2 / (2.0 * slows)
+    for method in METHODS:
+        found = rollout.jacobian(method=method)
+        assert found.states[0] == pytest.approx(way, abs=1e-9)
+        assert found.states[3:] == pytest.approx([0.0, 0.0, 0.0], abs=1e-12)
+        assert found.parameters[0, 0] == pytest.approx(-way / 0.002, rel=1e-6)
+
+
 def test_a_certificate_says_how_far_its_derivative_holds() -> None:
     rollout = tangible.Rollout(ball(), ["bodies/ball/position/y", "bodies/ball/mass"])
     assert rollout.certificate().radius == {} and rollout.certificate().growth is None
