@@ -21,8 +21,8 @@ constexpr int kMaxRefinements = 40;
 // The contradictory part of redundant rows remains in the residual; a correction after which the
 // residual exceeds this multiple of it is rejected.
 constexpr double kStays = 2.0;
-// Impulses that exceed the largest momentum by more than this squeeze bodies between rows that nearly
-// depend on each other; those of a pile at rest exceed a body's by its height in bodies.
+// Impulses that exceed the largest momentum by more than this squeeze bodies between rows that
+// nearly depend on each other; those of a pile at rest exceed a body's by its height in bodies.
 constexpr double kSqueezes = 30.0;
 
 // block(row, :) += part, of a constraint's 3 x 3 block on a body.

@@ -9,7 +9,8 @@ namespace tangible {
 /// Of the r M⁻¹ rᵀ of the row: the proximal term δ of redundant rows, which only selects one of
 /// several possible impulses.
 inline constexpr double kContactRegularisation = 1e-10;
-/// The same of a system that is factorised as a whole, because its rows nearly depend on each other.
+/// The same of a system that is factorised as a whole, because its rows nearly depend on each
+/// other.
 inline constexpr double kWholeRegularisation = 1e-14;
 /// Of the terms of a row: refinement of a solve ends at rounding level.
 inline constexpr double kResidualGoal = 1e-15;

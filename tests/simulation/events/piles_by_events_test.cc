@@ -153,9 +153,10 @@ TEST(PilesByEventsTest, DiscsThatJustFitBetweenWallsComeToRest) {
   }
 }
 
-// The same on places that people write: rows that depend on each other to a millionth, with impulses
-// that squeeze the discs a million times harder than they weigh, are solved by the whole system. The
-// condensed one squares that millionth: of these runs it left 27 solves to the last methods.
+// The same on places that people write: rows that depend on each other to a millionth, with
+// impulses that squeeze the discs a million times harder than they weigh, are solved by the whole
+// system. The condensed one squares that millionth: of this run it left 27 solves to the last
+// methods.
 TEST(PilesByEventsTest, DiscsThatJustFitOnRoundPlacesNeedNoLastMethods) {
   constexpr int kDiscs = 5;
   Scene scene = Empty(Integrator::kRungeKutta4, 3.0);
