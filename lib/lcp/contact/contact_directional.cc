@@ -17,10 +17,6 @@ RowPart<double> Scaled(double factor, const RowPart<double>& row) {
   return {factor * row[0], factor * row[1], factor * row[2]};
 }
 
-RowPart<double> SlantedRow(const RowPart<double>& n, double factor, const RowPart<double>& t) {
-  return {n[0] + factor * t[0], n[1] + factor * t[1], n[2] + factor * t[2]};
-}
-
 ContactKink KinkOf(const ContactProblem<double>& problem, const ContactSolution<double>& solution,
                    const ContactScales& scales, size_t i, bool touching, double tolerance) {
   const ContactBlock<double>& c = problem.contacts[i];
@@ -126,8 +122,8 @@ void ContactDirectional::ListRows() {
     const int contact = static_cast<int>(i);
     const auto normal = [&](double along) {
       rows_.push_back({contact, Part::kNormal, c.normal_a, c.normal_b,
-                       SlantedRow(c.normal_a, along, c.tangent_a),
-                       SlantedRow(c.normal_b, along, c.tangent_b), 0.0});
+                       Combine(c.normal_a, along, c.tangent_a),
+                       Combine(c.normal_b, along, c.tangent_b), 0.0});
     };
     const auto tangent = [&](double factor) {
       const RowPart<double> a = Scaled(factor, c.tangent_a);

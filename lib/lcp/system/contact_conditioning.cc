@@ -22,10 +22,6 @@ struct ActiveRow {
   double scale;  // (r M⁻¹ rᵀ)^(-1/2)
 };
 
-RowPart<double> Slanted(const RowPart<double>& n, double factor, const RowPart<double>& t) {
-  return {n[0] + factor * t[0], n[1] + factor * t[1], n[2] + factor * t[2]};
-}
-
 std::vector<ActiveRow> ListActiveRows(const ContactProblem<double>& problem,
                                       const std::vector<ContactMode>& modes) {
   std::vector<ActiveRow> rows;
@@ -52,8 +48,8 @@ std::vector<ActiveRow> ListActiveRows(const ContactProblem<double>& problem,
     if (!c.driven) {
       ActiveRow& normal = add(3 * block, c.a, c.b, c.normal_a, c.normal_b);
       if (const double along = -SlidingSign(modes[i]) * c.friction; along != 0.0) {
-        normal.push_a = Slanted(c.normal_a, along, c.tangent_a);
-        normal.push_b = Slanted(c.normal_b, along, c.tangent_b);
+        normal.push_a = Combine(c.normal_a, along, c.tangent_a);
+        normal.push_b = Combine(c.normal_b, along, c.tangent_b);
       }
     }
     if (modes[i] == ContactMode::kSticking) {
