@@ -203,7 +203,7 @@ Axis AxisOf(const std::vector<PlotSeries>& series, const PlotOptions& options,
 
 /// Tick labels with only as many digits as distinguish neighbours.
 std::string TickLabel(double tick, double step) {
-  if (std::abs(tick) < kTickRounding * step) {
+  if (std::abs(tick) <= kTickRounding * step) {
     return "0";
   }
   const double digits = std::ceil(std::log10(std::abs(tick) / step) + kTickRounding) + 1.0;
