@@ -193,6 +193,7 @@ OrderedJson RunSummary::ToJson(const Model<double>& model, const RolloutReport& 
       {"lcp_rows_max", report.lcp_rows_max},
       {"islands_max", islands_max_},
       {"events", report.events},
+      {"bounces_ended", report.bounces_ended},
       {"ellipse_motions", report.ellipse_motions},
       {"fallbacks", SumOf(fallbacks)},
       {"solver",

@@ -108,6 +108,7 @@ TEST_F(TangibleSimulateTest, SummaryHasItsKeysAndItsNumbersAreRight) {
                           "reductions",
                           "fallback_kinds",
                           "undetermined_end",
+                          "bounces_ended",
                           "ellipse_motions",
                           "rounding_of_coordinates"}) {
     EXPECT_TRUE(s.contains(key)) << key;

@@ -271,6 +271,64 @@ double EventStepper::ReturnSpeed(const Model<double>& model, const State<double>
   return std::sqrt(2.0 * acceleration * search_.TouchTolerance(model, state, contact));
 }
 
+double EventStepper::SizeOfGap(const Model<double>& model, const ActiveContact& contact) const {
+  return contact.joint >= 0 && model.structure->joints[contact.joint].is_angular
+             ? 1.0
+             : search_.lengths().Size(contact.a, contact.b);
+}
+
+// The impact of the contacts of a group that touch and do not leave, as a new part of the record.
+Impulses* EventStepper::ListImpact(const Model<double>& model, double t, double slow, int group,
+                                   const State<double>& state, StepReport* outcome) {
+  const SimulationSettings& settings = model.structure->settings;
+  EventPart* part = record_.Add();
+  part->is_impulses = true;
+  Impulses& impact = part->impulses;
+  impact.time = t;
+  impact.inside = inside_;
+  impact.h = 0.0;
+  impact.decompression = false;
+  impact.before = state;
+  impact.contacts.clear();
+  impact.friction.clear();
+  impact.restitution.clear();
+  rebounds_.clear();
+  bool rattles = false;
+  for (size_t i = 0; i < touching_.contacts.size(); ++i) {
+    rattles = rattles || (impacts_.Of(i) == group && Rattles(model, touching_.contacts[i]));
+  }
+  for (size_t i = 0; i < touching_.contacts.size(); ++i) {
+    // In a rattle contacts that leave slowly are held with the others, because they would return at
+    // once.
+    const double leaves =
+        rattles ? std::max(slow, ReturnSpeed(model, state, touching_.contacts[i])) : slow;
+    // Friction in a joint is a force, which does nothing at an instant.
+    if (touching_.approach[i] > leaves || impacts_.Of(i) != group ||
+        touching_.contacts[i].IsJointFriction() || LacksItsContact(i, impact.contacts)) {
+      continue;
+    }
+    ActiveContact contact = touching_.contacts[i];
+    const double speed = -touching_.approach[i];
+    const double restitution = touching_.restitution[i].value;
+    bool rebounds =
+        restitution > 0.0 && !IsInelastic(model, contact) && speed > settings.restitution_threshold;
+    if (rebounds && bounces_.End(contact, t, speed, restitution,
+                                 kReboundHeight * SizeOfGap(model, contact), settings.dt)) {
+      rebounds = false;
+      ++outcome->bounces_ended;
+    }
+    if (rebounds && speed > 0.0) bounces_.Add(contact, t, speed, restitution);
+    // Poisson's law compresses all contacts inelastically first.
+    contact.law = rebounds && settings.impact_law == ImpactLaw::kNewton ? ContactLaw::kRestitution
+                                                                        : ContactLaw::kInelastic;
+    rebounds_.push_back(rebounds);
+    impact.contacts.push_back(contact);
+    impact.friction.push_back(touching_.friction[i]);
+    impact.restitution.push_back(touching_.restitution[i]);
+  }
+  return &impact;
+}
+
 void CountSolve(const ContactSolverReport& solved, StepReport* outcome) {
   outcome->factorisations += solved.factorisations;
   outcome->iterations += solved.iterations;

@@ -20,6 +20,9 @@ namespace {
 // thousand.
 constexpr long kEvaluationsOfEvent = 1000;
 
+// From so many closed contacts on the one whose mode ends first is looked for first.
+constexpr size_t kManyContacts = 12;
+
 double SpeedOf(const double* twist, double radius) {
   return std::hypot(twist[0], twist[1]) + std::abs(twist[2]) * radius;
 }
@@ -252,6 +255,8 @@ void EventSearch::TryStart(const Model<double>& model, double tolerance, Event t
           ? late.normal_impulse[trial.index]
           : motion.FrictionLeft(trial.index, motion.friction[trial.index].value, trial.sign, late);
   if (motion.num_stages > 1 && !(last < -tolerance)) return;
+  // A solve, before the motions that follow: in a pile the share of a contact is often redundant.
+  if (!IsDetermined(trial, &At(model, event->length)->motion.stages[0])) return;
   double at_end = 0.0, value = 0.0;
   for (const double share : {1.0, 0.5, 0.125, 0x1p-6, 0x1p-9}) {
     value = ModeValue(model, At(model, share * event->length), trial);
@@ -260,7 +265,6 @@ void EventSearch::TryStart(const Model<double>& model, double tolerance, Event t
   }
   // A value that jumps at the start is rounding of bodies whose masses are far apart.
   if (value < 0.5 * at_end) return;
-  if (!IsDetermined(trial, &At(model, event->length)->motion.stages[0])) return;
   trial.at_start = true;
   trial.length = event->length;
   *event = trial;
@@ -320,8 +324,47 @@ double EventSearch::FindDip(const Model<double>& model, const Event& event, doub
   return least < kDipMargin * (rb - ra) ? a + x * width : b;
 }
 
+size_t EventSearch::FirstToEnd(const Model<double>& model, const Event& event) {
+  const Sample& sample = *At(model, event.length);
+  if (!sample.good) return 0;
+  const Segment& motion = sample.motion;
+  const ContactSolution<double>& start = motion.stages[0].solution;
+  const ContactSolution<double>& late = motion.stages[motion.num_stages - 1].solution;
+  size_t first = 0;
+  double earliest = kInfinity;
+  for (size_t i = 0; i < motion.contacts.size(); ++i) {
+    const auto compare = [&](double from, double to) {
+      if (!(from > 0.0 && to < 0.0)) return;
+      const double share = from / (from - to);
+      // What differs by rounding alone keeps the order of the contacts.
+      if (share < (1.0 - kSameShare) * earliest) {
+        earliest = share;
+        first = i;
+      }
+    };
+    const ActiveContact& contact = motion.contacts[i];
+    if (const double sign = SlidingSign(motion.modes[i]); sign != 0.0) {
+      compare(sign * SpeedsOf(model, motion.before, contact).slip,
+              sign * SpeedsOf(model, motion.after, contact).slip);
+    }
+    if (!contact.IsPureFriction()) compare(start.normal_impulse[i], late.normal_impulse[i]);
+    if (motion.modes[i] == ContactMode::kSticking && !motion.SticksWithEarlier(i)) {
+      const double friction = motion.friction[i].value;
+      for (const double sign : {1.0, -1.0}) {
+        compare(motion.FrictionLeft(i, friction, sign, start),
+                motion.FrictionLeft(i, friction, sign, late));
+      }
+    }
+  }
+  return first;
+}
+
 void EventSearch::SearchClosed(const Model<double>& model, Event* event) {
-  for (size_t i = 0; i < segment_->contacts.size() && !event->at_start; ++i) {
+  if (segment_->contacts.empty()) return;
+  // Of few contacts a search in their order costs little.
+  const size_t first = segment_->contacts.size() < kManyContacts ? 0 : FirstToEnd(model, *event);
+  for (size_t k = 0; k < segment_->contacts.size() && !event->at_start; ++k) {
+    const size_t i = k == 0 ? first : k - (k <= first ? 1 : 0);
     const ContactMode mode = segment_->modes[i];
     Event trial;
     trial.index = static_cast<int>(i);

@@ -129,6 +129,9 @@ class EventSearch {
                  const CourseOver& course_over, double tolerance, double from, double to,
                  double* root);
   void SearchClosed(const Model<double>& model, Event* event);
+  /// The closed contact whose mode ends first, by values at both ends of the motion: once its event
+  /// is found, the others are dismissed by its instant alone. Else the first one.
+  size_t FirstToEnd(const Model<double>& model, const Event& event);
   void SearchServos(const Model<double>& model, Event* event);  ///< servo_bounds.cc
   void SearchServo(const Model<double>& model, int servo, double sign, Event* event);
   void SearchSupports(const Model<double>& model, Event* event);  ///< support_bounds.cc

@@ -239,55 +239,11 @@ bool EventStepper::SolveImpacts(const Model<double>& model, double t, State<doub
     if (!CountImpact(model, slow, group, outcome)) {
       return false;
     }
-    Impulses* impact = ListImpact(model, t, slow, group, *state);
+    Impulses* impact = ListImpact(model, t, slow, group, *state, outcome);
     if (!SolveImpact(model, impact, state, outcome)) {
       return false;
     }
   }
-}
-
-// The impact of the contacts of a group that touch and do not leave, as a new part of the record.
-Impulses* EventStepper::ListImpact(const Model<double>& model, double t, double slow, int group,
-                                   const State<double>& state) {
-  const SimulationSettings& settings = model.structure->settings;
-  EventPart* part = record_.Add();
-  part->is_impulses = true;
-  Impulses& impact = part->impulses;
-  impact.time = t;
-  impact.inside = inside_;
-  impact.h = 0.0;
-  impact.decompression = false;
-  impact.before = state;
-  impact.contacts.clear();
-  impact.friction.clear();
-  impact.restitution.clear();
-  rebounds_.clear();
-  bool rattles = false;
-  for (size_t i = 0; i < touching_.contacts.size(); ++i) {
-    rattles = rattles || (impacts_.Of(i) == group && Rattles(model, touching_.contacts[i]));
-  }
-  for (size_t i = 0; i < touching_.contacts.size(); ++i) {
-    // In a rattle contacts that leave slowly are held with the others, because they would return at
-    // once.
-    const double leaves =
-        rattles ? std::max(slow, ReturnSpeed(model, state, touching_.contacts[i])) : slow;
-    // Friction in a joint is a force, which does nothing at an instant.
-    if (touching_.approach[i] > leaves || impacts_.Of(i) != group ||
-        touching_.contacts[i].IsJointFriction() || LacksItsContact(i, impact.contacts)) {
-      continue;
-    }
-    ActiveContact contact = touching_.contacts[i];
-    const bool rebounds = touching_.restitution[i].value > 0.0 && !IsInelastic(model, contact) &&
-                          touching_.approach[i] < -settings.restitution_threshold;
-    // Poisson's law compresses all contacts inelastically first.
-    contact.law = rebounds && settings.impact_law == ImpactLaw::kNewton ? ContactLaw::kRestitution
-                                                                        : ContactLaw::kInelastic;
-    rebounds_.push_back(rebounds);
-    impact.contacts.push_back(contact);
-    impact.friction.push_back(touching_.friction[i]);
-    impact.restitution.push_back(touching_.restitution[i]);
-  }
-  return &impact;
 }
 
 bool EventStepper::SolveImpact(const Model<double>& model, Impulses* impact, State<double>* state,
@@ -731,6 +687,7 @@ StepReport EventStepper::Advance(const Model<double>& model, double t, double h,
   limited_ = false;
   counts_.Clear();
   shortened_.Clear();
+  bounces_.Clear();
   search_.StartStep(model, t, h, *state);
   supports_.StartStep(*model.structure, t);
   AddEdgesAtStart(model, t, *state, &outcome);

@@ -28,6 +28,7 @@
 #include "tangible/simulation/events/event_edges.h"
 #include "tangible/simulation/events/event_search.h"
 #include "tangible/simulation/events/impact_groups.h"
+#include "tangible/simulation/events/rebounds.h"
 #include "tangible/simulation/events/step_report.h"
 #include "tangible/simulation/events/support_modes.h"
 
@@ -116,7 +117,7 @@ class EventStepper {
                   StepReport* outcome);
   /// An impact of the group `group` of impacts_.
   Impulses* ListImpact(const Model<double>& model, double t, double slow, int group,
-                       const State<double>& state);
+                       const State<double>& state, StepReport* outcome);
   /// A touching contact that approaches, of the group whose impact is the next one at this instant:
   /// the one that has begun, or else that of the event that ended the last segment, or else that of
   /// the first contact that approaches; −1: none approaches faster than `slow`, m/s.
@@ -204,6 +205,8 @@ class EventStepper {
   /// tolerance, m/s (of an angle's rad/s).
   double ReturnSpeed(const Model<double>& model, const State<double>& state,
                      const ActiveContact& contact) const;
+  /// The size of the bodies of a contact, m; of an angle's limit 1 rad.
+  double SizeOfGap(const Model<double>& model, const ActiveContact& contact) const;
   /// The speed below which a touching contact counts as neither approaching nor leaving nor
   /// sliding, m/s.
   double SlowSpeed(const Model<double>& model, const State<double>& state) const;
@@ -254,6 +257,7 @@ class EventStepper {
   std::vector<CoefficientSource> listed_friction_;
   EventGuess guess_;
   EventCounts counts_;              ///< of this step
+  Rebounds bounces_;                ///< of this step
   EventCounts shortened_;           ///< motions shortened at ellipses in this step
   ImpactGroups impacts_;            ///< of this instant
   CoupledBodies coupled_;           ///< as contacts stop sliding

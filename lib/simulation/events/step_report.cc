@@ -17,6 +17,7 @@ void StepCounts::Add(const StepCounts& other) {
   factorisations += other.factorisations;
   iterations += other.iterations;
   events += other.events;
+  bounces_ended += other.bounces_ended;
   given_up.Add(other.given_up);
   solver.Add(other.solver);
   newton_stages += other.newton_stages;

@@ -42,6 +42,7 @@ struct StepCounts {
   long factorisations = 0;   ///< of a fixed step: of the island that took the most
   long iterations = 0;       ///< of a fixed step: of the island that took the most
   long events = 0;           ///< located within the step (event stepping)
+  long bounces_ended = 0;    ///< by events: contacts whose ever faster rebounds were taken as over
   EventFallbacks given_up;   ///< what it gave up of its own rules
   ContactFallbacks solver;   ///< what its solves leaned on beyond the guess
   long newton_stages = 0;    ///< event stepping: implicit stages whose iteration does not contract

@@ -96,9 +96,15 @@ inline constexpr double kLeastSpeed = 1e-200;
 inline constexpr double kRattle = 1e-3;
 /// Of the speed above: an approach speed that is not larger after an impact counts as solved.
 inline constexpr double kSolvedApproach = 100.0;
+/// Of the size of a contact's bodies: the height of the rest of a sequence of rebounds that come
+/// ever faster, which then ends at once (rebounds.h).
+inline constexpr double kReboundHeight = 1e-9;
 /// Of the step: accelerations without a solution (Painlevé) are replaced by impulses of a step this
 /// short.
 inline constexpr double kPainleveStep = 1e-9;
+/// Of the share of a motion at which a contact's mode ends: contacts that differ by less keep their
+/// order.
+inline constexpr double kSameShare = 1e-6;
 /// Absolute: keeps divisors from being 0.
 inline constexpr double kNoScale = 1e-300;
 

@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Rebounds that come ever faster end at their limit, with its motion and derivatives.
+#include "tangible/simulation/events/rebounds.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "../../support/gradients.h"
+#include "../../support/scenes.h"
+#include "tangible/simulation/stepping/rollout.h"
+
+namespace tangible {
+namespace {
+
+using test_scenes::SceneOf;
+using testing::Jacobian;
+
+constexpr double kFallAcceleration = 9.81;
+
+/// A disc that is dropped from `height` and slides at 3 m/s, for 1.5 s.
+Scene Dropped(double height, double restitution, double friction, double dt) {
+  const std::string laws = R"("restitution": )" + std::to_string(restitution) +
+                           R"(, "friction": )" + std::to_string(friction);
+  return SceneOf(R"({"bodies": [
+      {"name": "ball", "shape": {"circle": {"radius": 0.1}}, "mass": 1.5, "position": [0, )" +
+                 std::to_string(0.1 + height) + R"(], "velocity": [3, 0], )" + laws + R"(},
+      {"name": "floor", "static": true, )" +
+                 laws + R"(, "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
+    "simulation": {"stepping": "event", "integrator": "runge_kutta_4", "restitution_threshold": 0,
+                   "dt": )" +
+                 std::to_string(dt) + R"(, "duration": 1.5}})");
+}
+
+// The impulses of friction follow those of the floor, whose sum up to t is m (g t + v_y):
+//   v_x = 3 − μ g T,   x = 3 T − μ (g T² / 2 − h),   whatever the restitution.
+TEST(ReboundsTest, ADiscThatIsDroppedSlidesAsFarAsTheFormulaSays) {
+  const double end = 1.5;
+  for (const double restitution : {0.2, 0.5, 0.8}) {
+    for (const double dt : {0.01, 0.05}) {
+      SCOPED_TRACE(std::to_string(restitution) + " " + std::to_string(dt));
+      const double height = 0.05;
+      const double friction = 0.05;
+      const Scene scene = Dropped(height, restitution, friction, dt);
+      Model<double> model;
+      State<double> state, last;
+      BuildModel(scene, &model, &state);
+      const RolloutReport report = Rollout(model, state, {}, &last);
+      ASSERT_EQ(report.status, StepStatus::kDone) << report.message;
+      EXPECT_EQ(report.bounces_ended, 1);
+      EXPECT_EQ(report.given_up.total(), 0);
+      EXPECT_NEAR(last.pose[1], 0.1, 1e-12);
+      EXPECT_NEAR(last.twist[0], 3.0 - friction * kFallAcceleration * end, 1e-10);
+      EXPECT_NEAR(last.pose[0],
+                  3.0 * end - friction * (0.5 * kFallAcceleration * end * end - height), 1e-9);
+      const GradientResult r = Jacobian(
+          scene, {"bodies/ball/position/y", "bodies/ball/restitution"}, GradientMethod::kAdjoint);
+      EXPECT_NEAR(r.jacobian(0, 0), friction, 1e-6);
+      EXPECT_NEAR(r.jacobian(0, 1), 0.0, 1e-6);
+    }
+  }
+}
+
+// Without what brings it back, or where it comes back faster, a contact rebounds however slow it
+// is.
+TEST(ReboundsTest, EndOnlyWhereTheyShrinkAndReturnAtOnce) {
+  ActiveContact contact;
+  contact.a = 0;
+  contact.b = 1;
+  Rebounds rebounds;
+  EXPECT_FALSE(rebounds.End(contact, 0.0, 1e-6, 0.5, 1e-9, 0.01));
+  rebounds.Add(contact, 0.0, 1e-5, 0.5);
+  EXPECT_FALSE(rebounds.End(contact, 0.0, 5e-6, 0.5, 1e-9, 0.01)) << "the same instant";
+  EXPECT_FALSE(rebounds.End(contact, 1e-6, 2e-5, 0.5, 1e-9, 0.01)) << "faster than before";
+  EXPECT_FALSE(rebounds.End(contact, 0.01, 5e-6, 0.5, 1e-9, 0.01)) << "the rest takes too long";
+  EXPECT_FALSE(rebounds.End(contact, 1e-6, 5e-6, 0.5, 1e-14, 0.01)) << "it rises too high";
+  EXPECT_FALSE(rebounds.End(contact, 1e-6, 5e-6, 1.0, 1e-9, 0.01)) << "it does not shrink";
+  EXPECT_TRUE(rebounds.End(contact, 1e-6, 5e-6, 0.5, 1e-9, 0.01));
+  ActiveContact other = contact;
+  other.b = 2;
+  EXPECT_FALSE(rebounds.End(other, 1e-6, 5e-6, 0.5, 1e-9, 0.01));
+  rebounds.Clear();
+  EXPECT_FALSE(rebounds.End(contact, 1e-6, 5e-6, 0.5, 1e-9, 0.01));
+}
+
+}  // namespace
+}  // namespace tangible
