@@ -238,6 +238,13 @@ function(tangible_test name)
   set_tests_properties(${entries} PROPERTIES LABELS "${TEST_LABELS}" TIMEOUT ${TEST_TIMEOUT})
 endfunction()
 
+# tangible_thorough(<entry> COMMAND word...): the tests of an entry at their full size (tests/support/thorough.h).
+function(tangible_thorough entry)
+  cmake_parse_arguments(THOROUGH "" "" "COMMAND" ${ARGN})
+  add_test(NAME ${entry}_thorough COMMAND ${THOROUGH_COMMAND})
+  set_tests_properties(${entry}_thorough PROPERTIES LABELS slow TIMEOUT 3600 ENVIRONMENT "TANGIBLE_THOROUGH=1")
+endfunction()
+
 # tangible_benchmark(<name> SOURCES file... LINK target...): a Google Benchmark program, not a test.
 function(tangible_benchmark name)
   cmake_parse_arguments(BENCHMARK "" "" "SOURCES;LINK" ${ARGN})

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "../support/thorough.h"
 #include "tangible/config/jet_widths.h"
 #include "tangible/scene/scene_json.h"
 #include "tangible/simulation/gradient/gradient.h"
@@ -30,9 +31,9 @@ bool HaveJets() {
 }
 
 // At most so many numbers through unrolled Jets, evenly spread: they take a hundred times longer.
-constexpr int kMaxUnrolled = 24;
+int MaxUnrolled() { return testing::Thorough() ? 24 : 8; }
 // At most so many through differences, which take 40 runs each.
-constexpr int kMaxDifferenced = 32;
+int MaxDifferenced() { return testing::Thorough() ? 32 : 10; }
 // Longer runs are cut here: their derivatives are summed from as many steps, but each number takes
 // nine runs of differences.
 constexpr double kMaxSteps = 2000;
@@ -133,7 +134,7 @@ TEST_P(DataSceneTest, UnrolledJetsAgree) {
   if (!HaveJets()) {
     GTEST_SKIP() << "no width of Jets was built";
   }
-  const int stride = (static_cast<int>(parameters_.size()) + kMaxUnrolled - 1) / kMaxUnrolled;
+  const int stride = (static_cast<int>(parameters_.size()) + MaxUnrolled() - 1) / MaxUnrolled();
   std::vector<ParameterPath> some;
   for (size_t p = 0; p < parameters_.size(); p += stride) {
     some.push_back(parameters_[p]);
@@ -161,7 +162,7 @@ TEST_P(DataSceneTest, DifferencesAgree) {
   long compared = 0;
   long judged = 0;
   long nonzero = 0;
-  const size_t stride = (parameters_.size() + kMaxDifferenced - 1) / kMaxDifferenced;
+  const size_t stride = (parameters_.size() + MaxDifferenced() - 1) / MaxDifferenced();
   for (size_t k = 0; k < parameters_.size(); k += stride) {
     const auto p = static_cast<Eigen::Index>(k);
     compared += tangent_.jacobian.rows();

@@ -20,7 +20,7 @@ namespace tangible {
 /// Fits of a calibration; 500 where the test is not to be quick.
 inline int NumReplicas() {
   const char* const text = std::getenv("TANGIBLE_CALIBRATION_REPLICAS");
-  return text == nullptr ? 40 : std::atoi(text);
+  return text == nullptr ? 20 : std::atoi(text);
 }
 
 inline constexpr char kFallingBall[] = R"({"name": "falling ball", "bodies": [

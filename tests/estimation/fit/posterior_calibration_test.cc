@@ -18,8 +18,8 @@
 namespace tangible {
 namespace {
 
-constexpr int kBins = 20;
-// Ranks from 0 to kRanks, 5 a bin, among every fourth draw, which are next to independent.
+constexpr int kBins = 10;
+// Ranks from 0 to kRanks, 10 a bin, among every fourth draw, which are next to independent.
 constexpr int kRanks = 99;
 constexpr int kThinning = 4;
 constexpr double kLeastProbability = 1e-3;

@@ -134,7 +134,7 @@ class RandomScenes : public ::testing::TestWithParam<Stepping> {};
 
 TEST_P(RandomScenes, KeepTheirChoicesWithinTheRadiusAndChangeThemBeyond) {
   const char* size = std::getenv("TANGIBLE_RADIUS_SCENES");
-  const unsigned scenes = size != nullptr ? static_cast<unsigned>(std::atoi(size)) : 60U;
+  const unsigned scenes = size != nullptr ? static_cast<unsigned>(std::atoi(size)) : 30U;
   Tally tally;
   for (unsigned seed = 1; seed <= scenes; ++seed) {
     AddScene(RandomScene(seed, {.stepping = GetParam()}), seed, size != nullptr, &tally);
