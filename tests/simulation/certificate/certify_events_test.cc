@@ -133,10 +133,13 @@ TEST(CertifyEventsTest, ASeriesThatRoundingEndsIsNamed) {
                              Floor() + "]",
                          0.01, more);
   };
-  const Certificate series = of(R"(, "restitution_threshold": 1e-16)");
+  const Certificate series = of(R"(, "restitution_threshold": 1e-16, "max_events_per_step": 4)");
   EXPECT_EQ(series.verdict.find("near a kink: "), 0u) << series.verdict;
   EXPECT_NE(series.verdict.find("events in a step"), std::string::npos) << series.verdict;
   EXPECT_EQ(of("").verdict.find("events in a step"), std::string::npos);
+  // With as many events as the series has until its rest is next to nothing it ends at its limit.
+  EXPECT_EQ(of(R"(, "restitution_threshold": 1e-16)").verdict.find("events in a step"),
+            std::string::npos);
 }
 
 // Without another body nothing only touches when another impact moves it.
