@@ -75,6 +75,7 @@ TEST(ReboundsTest, EndOnlyWhereTheyShrinkAndReturnAtOnce) {
   rebounds.Add(contact, 0.0, 1e-5, 0.5);
   EXPECT_FALSE(rebounds.End(contact, 0.0, 5e-6, 0.5, 1e-9, 0.01)) << "the same instant";
   EXPECT_FALSE(rebounds.End(contact, 1e-6, 2e-5, 0.5, 1e-9, 0.01)) << "faster than before";
+  EXPECT_FALSE(rebounds.End(contact, 1e-6, 4e-6, 0.5, 1e-9, 0.01)) << "sent back by an impact";
   EXPECT_FALSE(rebounds.End(contact, 0.01, 5e-6, 0.5, 1e-9, 0.01)) << "the rest takes too long";
   EXPECT_FALSE(rebounds.End(contact, 1e-6, 5e-6, 0.5, 1e-14, 0.01)) << "it rises too high";
   EXPECT_FALSE(rebounds.End(contact, 1e-6, 5e-6, 1.0, 1e-9, 0.01)) << "it does not shrink";
