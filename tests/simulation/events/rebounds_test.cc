@@ -64,6 +64,72 @@ TEST(ReboundsTest, ADiscThatIsDroppedSlidesAsFarAsTheFormulaSays) {
   }
 }
 
+// Three equal balls without gravity, the first of which strikes at 1 m/s: each impact of a pair
+// leaves −e times its relative speed. The first ball follows the second one, which the third has
+// slowed down, and strikes again, however small the gaps between them are.
+TEST(ReboundsTest, BallsThatAreNearlyInTouchAllRebound) {
+  const double restitution = 0.9;
+  double v[3] = {1.0, 0.0, 0.0};
+  const auto strike = [&](int i) {
+    const double mean = 0.5 * (v[i] + v[i + 1]);
+    const double half = 0.5 * restitution * (v[i] - v[i + 1]);
+    v[i] = mean - half;
+    v[i + 1] = mean + half;
+  };
+  strike(0);
+  strike(1);
+  ASSERT_GT(v[0], v[1]);
+  strike(0);
+  ASSERT_LT(v[0], v[1]);
+  ASSERT_LT(v[1], v[2]);
+  for (const double gap : {1e-3, 1e-6, 1e-9}) {
+    SCOPED_TRACE(gap);
+    Scene scene = SceneOf(R"({"gravity": [0, 0], "bodies": [
+        {"name": "a", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0, 0],
+         "velocity": [1, 0], "restitution": 0.9},
+        {"name": "b", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0.2, 0],
+         "restitution": 0.9},
+        {"name": "c", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0.4, 0],
+         "restitution": 0.9}],
+      "simulation": {"stepping": "event", "dt": 0.1, "duration": 2,
+                     "restitution_threshold": 0}})");
+    for (int i = 0; i < 3; ++i) scene.bodies[static_cast<size_t>(i)].position[0] += i * gap;
+    Model<double> model;
+    State<double> state, last;
+    BuildModel(scene, &model, &state);
+    const RolloutReport report = Rollout(model, state, {}, &last);
+    ASSERT_EQ(report.status, StepStatus::kDone) << report.message;
+    EXPECT_EQ(report.bounces_ended, 0);
+    for (size_t i = 0; i < 3; ++i) EXPECT_NEAR(last.twist[3 * i], v[i], 1e-12) << i;
+  }
+}
+
+// It bounces at multiples of dt and is at rest at 0.3 s, on one too.
+TEST(ReboundsTest, ASeriesOfRoundTimesEndsAtItsLimit) {
+  for (const char* law : {"newton", "poisson"}) {
+    for (const double dt : {0.1, 0.05, 0.01}) {
+      SCOPED_TRACE(std::string(law) + " " + std::to_string(dt));
+      Scene scene = Dropped(0.05, 0.5, 0.05, dt);
+      scene.gravity = {0.0, -10.0};
+      scene.simulation.duration = 1.0;
+      scene.simulation.impact_law =
+          std::string(law) == "newton" ? ImpactLaw::kNewton : ImpactLaw::kPoisson;
+      Model<double> model;
+      State<double> state, last;
+      BuildModel(scene, &model, &state);
+      const RolloutReport report = Rollout(model, state, {}, &last);
+      ASSERT_EQ(report.status, StepStatus::kDone) << report.message;
+      EXPECT_EQ(report.bounces_ended, 1);
+      EXPECT_NEAR(last.twist[0], 3.0 - 0.05 * 10.0, 1e-10);
+      EXPECT_NEAR(last.pose[0], 3.0 - 0.05 * (0.5 * 10.0 - 0.05), 1e-9);
+      const GradientResult r = Jacobian(scene, {"bodies/ball/position/y", "bodies/ball/velocity/x"},
+                                        GradientMethod::kAdjoint);
+      EXPECT_NEAR(r.jacobian(0, 0), 0.05, 1e-6);
+      EXPECT_NEAR(r.jacobian(0, 1), 1.0, 1e-9);
+    }
+  }
+}
+
 // Without what brings it back, or where it comes back faster, a contact rebounds however slow it
 // is.
 TEST(ReboundsTest, EndOnlyWhereTheyShrinkAndReturnAtOnce) {
