@@ -27,6 +27,7 @@ OrderedJson ToJson(const Certificate& certificate) {
                       {"linear_residual", certificate.linear_residual},
                       {"mode_switches", certificate.mode_switches},
                       {"events", certificate.events},
+                      {"bounces_ended", certificate.bounces_ended},
                       {"fallbacks", certificate.fallbacks},
                       {"discrete_map", !certificate.discrete_map.empty()},
                       {"advice", AdviceOf(certificate)},

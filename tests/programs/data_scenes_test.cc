@@ -33,7 +33,7 @@ bool HaveJets() {
 // At most so many numbers through unrolled Jets, evenly spread: they take a hundred times longer.
 int MaxUnrolled() { return testing::Thorough() ? 24 : 8; }
 // At most so many through differences, which take 40 runs each.
-int MaxDifferenced() { return testing::Thorough() ? 32 : 10; }
+int MaxDifferenced() { return testing::Thorough() ? 32 : 12; }
 // Longer runs are cut here: their derivatives are summed from as many steps, but each number takes
 // nine runs of differences.
 constexpr double kMaxSteps = 2000;
@@ -185,10 +185,11 @@ TEST_P(DataSceneTest, DifferencesAgree) {
           << Where(o, p) << ": " << b << " ± " << error << ", tangent " << a;
     }
   }
-  // Most entries were judged, and many say something; in a train of gears most bodies only turn.
+  // Most entries were judged, and many say something. In a train of gears most bodies only turn,
+  // and a few of its numbers are mostly such that move two of the 22 outputs.
   std::cout << judged << " of " << compared << " entries judged, " << nonzero << " not 0\n";
   EXPECT_GE(judged, compared * 3 / 4);
-  EXPECT_GE(nonzero, judged / 10);
+  EXPECT_GE(nonzero, judged / (testing::Thorough() ? 8 : 12));
 }
 
 INSTANTIATE_TEST_SUITE_P(Scenes, DataSceneTest, ::testing::ValuesIn(SceneFiles()),

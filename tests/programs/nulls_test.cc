@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "../support/thorough.h"
 #include "run_program.h"
 
 namespace tangible {
@@ -157,8 +158,8 @@ TEST_F(NullsTest, ThoseOfExtremeNumbers) {
   }
 }
 
-// What studies and the verification write, in small. Experiments are long: theirs are among the
-// shipped results.
+// What studies and the verification write, in small; with experiments it takes a minute longer,
+// and theirs are among the shipped results too.
 TEST_F(NullsTest, ThoseOfStudies) {
   Check("tangible-corpus", "--random=3 --contacts=20 --seed=3", "out");
   Check("tangible-extremes", "--group=paradox", "out");
@@ -174,6 +175,10 @@ TEST_F(NullsTest, ThoseOfStudies) {
   Check("tangible-bounce", "'" + kData + "control/struck_ball.json' --problems=2 --iterations=3",
         "out");
   Check("tangible-closed-forms", "", "out");
+  if (testing::Thorough()) {
+    Check("tangible-cartpole", "--quick", "out");
+    Check("tangible-breakout", "--quick --games=1", "out");
+  }
 }
 
 // The results that are shipped were written by the programs at their full sizes.

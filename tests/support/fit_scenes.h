@@ -14,13 +14,14 @@
 #include "tangible/estimation/fit/fit.h"
 #include "tangible/scene/scene_json.h"
 #include "tangible/simulation/stepping/rollout.h"
+#include "thorough.h"
 
 namespace tangible {
 
 /// Fits of a calibration; 500 where the test is not to be quick.
 inline int NumReplicas() {
   const char* const text = std::getenv("TANGIBLE_CALIBRATION_REPLICAS");
-  return text == nullptr ? 20 : std::atoi(text);
+  return text != nullptr ? std::atoi(text) : testing::Thorough() ? 40 : 20;
 }
 
 inline constexpr char kFallingBall[] = R"({"name": "falling ball", "bodies": [

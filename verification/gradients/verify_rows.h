@@ -61,8 +61,8 @@ void VisitFields(ValidityRadius& radius, const Visitor& visit) {
 template <typename Visitor>
 void VisitFields(Certificate& certificate, const Visitor& visit) {
   auto& [margin_min, margin_where, degenerate_rows, redundant_rows, condition, linear_residual,
-         mode_switches, events, fallbacks, coordinates, one_sided, discontinuous, discrete_map,
-         discrete_impact, radius, growth, verdict] = certificate;
+         mode_switches, events, bounces_ended, fallbacks, coordinates, one_sided, discontinuous,
+         discrete_map, discrete_impact, radius, growth, verdict] = certificate;
   visit("margin_min", margin_min);
   visit("margin_where", margin_where);
   visit("degenerate_rows", degenerate_rows);
@@ -71,6 +71,7 @@ void VisitFields(Certificate& certificate, const Visitor& visit) {
   visit("linear_residual", linear_residual);
   visit("mode_switches", mode_switches);
   visit("events", events);
+  visit("bounces_ended", bounces_ended);
   visit("fallbacks", fallbacks);
   visit("coordinates", coordinates);
   visit("one_sided", one_sided);

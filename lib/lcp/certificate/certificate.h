@@ -43,6 +43,7 @@ struct Certificate {
   double linear_residual = 0.0;
   int mode_switches = 0;  ///< over a rollout: contacts that changed mode between steps
   int events = 0;         ///< over a rollout: impacts and other events
+  int bounces_ended = 0;  ///< over a rollout: ever faster rebounds that were taken as over
   int fallbacks = 0;      ///< over a rollout: steps not solved by the first solver
   std::string
       coordinates{};        ///< where they round so coarsely that modes may be rounding; else empty

@@ -435,6 +435,7 @@ Certificate RolloutCertifier::Finish(const Model<double>& model, const RolloutRe
   AddPaths(model);
   certificate_.mode_switches = static_cast<int>(report.mode_switches);
   certificate_.events = static_cast<int>(report.events);
+  certificate_.bounces_ended = static_cast<int>(report.bounces_ended);
   certificate_.fallbacks = static_cast<int>(report.given_up.total() +
                                             report.SolvedBy(Rung::kInteriorPoint, Rung::kLemke));
   if (jump_margin_ < kNearJumpMargin) {

@@ -54,17 +54,8 @@ bool EventStepper::Decompress(const Model<double>& model, const Impulses& compre
   if (std::none_of(reached.begin(), reached.end(), [](bool x) { return x; })) {
     return true;
   }
-  EventPart* part = record_.Add();
-  part->is_impulses = true;
-  Impulses& impact = part->impulses;
-  impact.time = compression.time;
-  impact.inside = compression.inside;
-  impact.h = 0.0;
+  Impulses& impact = BeginImpulses(compression.time, *state);
   impact.decompression = true;
-  impact.before = *state;
-  impact.contacts.clear();
-  impact.friction.clear();
-  impact.restitution.clear();
   impact.compressed.clear();
   for (size_t i = 0; i < compression.contacts.size(); ++i) {
     const ActiveContact& contact = compression.contacts[i];

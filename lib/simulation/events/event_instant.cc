@@ -277,21 +277,27 @@ double EventStepper::SizeOfGap(const Model<double>& model, const ActiveContact& 
              : search_.lengths().Size(contact.a, contact.b);
 }
 
+// A new part of the record: an instant's impulses, without contacts so far.
+Impulses& EventStepper::BeginImpulses(double t, const State<double>& state) {
+  EventPart* part = record_.Add();
+  part->is_impulses = true;
+  Impulses& impulses = part->impulses;
+  impulses.time = t;
+  impulses.inside = inside_;
+  impulses.h = 0.0;
+  impulses.decompression = false;
+  impulses.before = state;
+  impulses.contacts.clear();
+  impulses.friction.clear();
+  impulses.restitution.clear();
+  return impulses;
+}
+
 // The impact of the contacts of a group that touch and do not leave, as a new part of the record.
 Impulses* EventStepper::ListImpact(const Model<double>& model, double t, double slow, int group,
                                    const State<double>& state, StepReport* outcome) {
   const SimulationSettings& settings = model.structure->settings;
-  EventPart* part = record_.Add();
-  part->is_impulses = true;
-  Impulses& impact = part->impulses;
-  impact.time = t;
-  impact.inside = inside_;
-  impact.h = 0.0;
-  impact.decompression = false;
-  impact.before = state;
-  impact.contacts.clear();
-  impact.friction.clear();
-  impact.restitution.clear();
+  Impulses& impact = BeginImpulses(t, state);
   rebounds_.clear();
   bool rattles = false;
   for (size_t i = 0; i < touching_.contacts.size(); ++i) {
@@ -312,12 +318,12 @@ Impulses* EventStepper::ListImpact(const Model<double>& model, double t, double 
     const double restitution = touching_.restitution[i].value;
     bool rebounds =
         restitution > 0.0 && !IsInelastic(model, contact) && speed > settings.restitution_threshold;
-    if (rebounds && bounces_.End(contact, t, speed, restitution,
-                                 kReboundHeight * SizeOfGap(model, contact), settings.dt)) {
+    if (rebounds && last_rebounds_.End(contact, t, speed, restitution,
+                                       kReboundHeight * SizeOfGap(model, contact), settings.dt)) {
       rebounds = false;
       ++outcome->bounces_ended;
     }
-    if (rebounds && speed > 0.0) bounces_.Add(contact, t, speed, restitution);
+    if (rebounds && speed > 0.0) last_rebounds_.Add(contact, t, speed, restitution);
     // Poisson's law compresses all contacts inelastically first.
     contact.law = rebounds && settings.impact_law == ImpactLaw::kNewton ? ContactLaw::kRestitution
                                                                         : ContactLaw::kInelastic;

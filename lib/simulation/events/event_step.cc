@@ -687,7 +687,7 @@ StepReport EventStepper::Advance(const Model<double>& model, double t, double h,
   limited_ = false;
   counts_.Clear();
   shortened_.Clear();
-  bounces_.Clear();
+  last_rebounds_.Clear();
   search_.StartStep(model, t, h, *state);
   supports_.StartStep(*model.structure, t);
   AddEdgesAtStart(model, t, *state, &outcome);

@@ -115,6 +115,7 @@ class EventStepper {
   /// the impulse of its compression (event_decompression.cc).
   bool Decompress(const Model<double>& model, const Impulses& compression, State<double>* state,
                   StepReport* outcome);
+  Impulses& BeginImpulses(double t, const State<double>& state);
   /// An impact of the group `group` of impacts_.
   Impulses* ListImpact(const Model<double>& model, double t, double slow, int group,
                        const State<double>& state, StepReport* outcome);
@@ -257,7 +258,7 @@ class EventStepper {
   std::vector<CoefficientSource> listed_friction_;
   EventGuess guess_;
   EventCounts counts_;              ///< of this step
-  Rebounds bounces_;                ///< of this step
+  Rebounds last_rebounds_;          ///< of this step
   EventCounts shortened_;           ///< motions shortened at ellipses in this step
   ImpactGroups impacts_;            ///< of this instant
   CoupledBodies coupled_;           ///< as contacts stop sliding

@@ -25,14 +25,8 @@ bool EventStepper::Tries::Halve() {
 
 bool EventStepper::SolveByShortStep(const Model<double>& model, double t, double dt,
                                     State<double>* state, StepReport* outcome) {
-  EventPart* part = record_.Add();
-  part->is_impulses = true;
-  Impulses& impulses = part->impulses;
-  impulses.time = t;
-  impulses.inside = inside_;
+  Impulses& impulses = BeginImpulses(t, *state);
   impulses.h = kPainleveStep * dt;
-  impulses.decompression = false;
-  impulses.before = *state;
   impulses.contacts = touching_.contacts;
   impulses.friction = touching_.friction;
   impulses.restitution.assign(touching_.contacts.size(), CoefficientSource());
@@ -109,16 +103,7 @@ void EventStepper::HoldModes(const ContactProblem<double>& problem, const std::v
 
 bool EventStepper::HoldsTouching(const Model<double>& model, double t, State<double>* state,
                                  StepReport* outcome) {
-  EventPart* part = record_.Add();
-  part->is_impulses = true;
-  Impulses& impulses = part->impulses;
-  impulses.time = t;
-  impulses.inside = inside_;
-  impulses.h = 0.0;
-  impulses.decompression = false;
-  impulses.before = *state;
-  impulses.contacts.clear();
-  impulses.friction.clear();
+  Impulses& impulses = BeginImpulses(t, *state);
   const double slow = SlowSpeed(model, *state);
   for (size_t i = 0; i < touching_.contacts.size(); ++i) {
     if (touching_.approach[i] > slow || touching_.contacts[i].IsJointFriction() ||

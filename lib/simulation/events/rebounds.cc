@@ -4,21 +4,16 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tangible/simulation/events/tolerances.h"
+
 namespace tangible {
-namespace {
-
-// Of the speed at which a contact left: a steady acceleration brings it back as fast. What another
-// impact sends back has another speed, and its rebound decides how bodies go on.
-constexpr double kSameSpeed = 0.01;
-
-}  // namespace
 
 bool Rebounds::End(const ActiveContact& contact, double time, double speed, double restitution,
                    double height, double duration) const {
   const auto last = std::find_if(last_.begin(), last_.end(),
                                  [&](const Rebound& one) { return one.contact.SameAs(contact); });
   if (last == last_.end() || !(time > last->time) || !(speed < last->speed)) return false;
-  if (!(std::abs(speed - last->leaves) <= kSameSpeed * last->leaves)) return false;
+  if (!(std::abs(speed - last->leaves) <= kReturnsAsFast * last->leaves)) return false;
   const double acceleration = (last->leaves + speed) / (time - last->time);
   const double leaves = restitution * speed;
   return leaves * leaves < 2.0 * acceleration * height &&

@@ -24,8 +24,8 @@ class Rebounds {
   void Clear() { last_.clear(); }
   /// Whether the sequence of a contact's rebounds ends with an impact at `time`, approached at
   /// `speed` > 0, m/s: since its last rebound in the step, which was faster, the contact has been
-  /// brought back by a steady acceleration, as fast as it left, by which (1) is less than `height`, m, and `duration`, s
-  /// (rad/s and rad of a joint's angle).
+  /// brought back by a steady acceleration, as fast as it left, by which (1) is less than `height`,
+  /// m, and `duration`, s (rad/s and rad of a joint's angle).
   bool End(const ActiveContact& contact, double time, double speed, double restitution,
            double height, double duration) const;
   /// Notes a rebound.

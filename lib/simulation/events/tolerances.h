@@ -99,6 +99,9 @@ inline constexpr double kSolvedApproach = 100.0;
 /// Of the size of a contact's bodies: the height of the rest of a sequence of rebounds that come
 /// ever faster, which then ends at once (rebounds.h).
 inline constexpr double kReboundHeight = 1e-9;
+/// Of the speed at which a contact left: a steady acceleration brings it back as fast. What another
+/// impact sends back has another speed, and its rebound decides how bodies go on.
+inline constexpr double kReturnsAsFast = 0.01;
 /// Of the step: accelerations without a solution (Painlevé) are replaced by impulses of a step this
 /// short.
 inline constexpr double kPainleveStep = 1e-9;

@@ -13,10 +13,10 @@ namespace tangible {
 namespace {
 
 /// A pendulum that is pushed, observed at each step to 1.5 s and then predicted.
-class NoiseOutputTest : public testing::Test {
+class NoiseOutputTest : public ::testing::Test {
  protected:
   void SetUp() override {
-    folder_ = testing::TempDir();
+    folder_ = ::testing::TempDir();
     Write("noise_scene.json", kPendulum);
     Scene real = MakeScene(kPendulum);
     real.joints[0].effort = 0.4;

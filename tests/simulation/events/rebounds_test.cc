@@ -60,6 +60,8 @@ TEST(ReboundsTest, ADiscThatIsDroppedSlidesAsFarAsTheFormulaSays) {
           scene, {"bodies/ball/position/y", "bodies/ball/restitution"}, GradientMethod::kAdjoint);
       EXPECT_NEAR(r.jacobian(0, 0), friction, 1e-6);
       EXPECT_NEAR(r.jacobian(0, 1), 0.0, 1e-6);
+      EXPECT_EQ(r.certificate.bounces_ended, 1);
+      EXPECT_EQ(r.certificate.verdict, "trustworthy");
     }
   }
 }

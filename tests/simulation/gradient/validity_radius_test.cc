@@ -12,6 +12,7 @@
 
 #include "../../support/gradients.h"
 #include "../../support/scenes.h"
+#include "../../support/thorough.h"
 #include "tangible/simulation/gradient/rollout_function.h"
 #include "tangible/verification/gradients/verify_run.h"
 #include "tangible/verification/support/random_scene.h"
@@ -134,7 +135,9 @@ class RandomScenes : public ::testing::TestWithParam<Stepping> {};
 
 TEST_P(RandomScenes, KeepTheirChoicesWithinTheRadiusAndChangeThemBeyond) {
   const char* size = std::getenv("TANGIBLE_RADIUS_SCENES");
-  const unsigned scenes = size != nullptr ? static_cast<unsigned>(std::atoi(size)) : 30U;
+  const unsigned scenes = size != nullptr       ? static_cast<unsigned>(std::atoi(size))
+                          : testing::Thorough() ? 60U
+                                                : 30U;
   Tally tally;
   for (unsigned seed = 1; seed <= scenes; ++seed) {
     AddScene(RandomScene(seed, {.stepping = GetParam()}), seed, size != nullptr, &tally);
