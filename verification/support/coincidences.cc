@@ -18,8 +18,13 @@ constexpr char kSymmetric[] = "coincidence: two at one instant, symmetric";
 constexpr char kPoisson[] = "coincidence: Poisson's phases";
 constexpr char kOfTwoKinds[] = "coincidence: two at one instant, of two kinds";
 
-// Of the parameter: the longest way to where derivatives are taken. The next kink is a step away.
+// Of the parameter: the longest way to where derivatives are taken. The next kink is mostly a step
+// away. Where derivatives change on the way, or the outputs by more than these say, it is within it,
+// and a shorter way is tried.
 constexpr long double kWay = 1e-6L;
+constexpr long double kShorter = 1e-2L;
+constexpr int kMostWays = 3;
+constexpr long double kBent = 1e-4L;
 // The size of a parameter that is 0: where a coincidence moves with the square of the way (that of
 // the speed at the top of a fall), the square must exceed the rounding of the scene's numbers.
 constexpr long double kSizeOfZero = 1.0L;
@@ -36,6 +41,12 @@ std::vector<Real> Outputs(const Coincidence& coincidence, const Map& numbers) {
   return coincidence.outputs([&](const std::string& path) { return numbers.at(path); });
 }
 
+long double LargestOf(const std::vector<long double>& x) {
+  long double largest = 0.0L;
+  for (const long double one : x) largest = std::max(largest, std::abs(one));
+  return largest;
+}
+
 // The derivative on one side: those beside the parameter, extrapolated to it by a parabola. NaN
 // where an output jumps at the parameter.
 VectorX<double> Side(const Coincidence& coincidence, const Map& at, const std::vector<Real>& values,
@@ -45,19 +56,32 @@ VectorX<double> Side(const Coincidence& coincidence, const Map& at, const std::v
   const long double size = value.value == 0.0L ? kSizeOfZero
                            : is_place          ? std::min(std::abs(value.value), kSizeOfPlace)
                                                : std::abs(value.value);
-  const long double way = sign * kWay * size;
   constexpr long double kPoints[3] = {1.0L, 0.5L, 0.25L};
   constexpr long double kWeights[3] = {1.0L / 3.0L, -2.0L, 8.0L / 3.0L};
+  constexpr long double kBends[3] = {1.0L, -3.0L, 2.0L};  // 0 for rates along a straight line
+  long double way = sign * kWay * size;
   std::vector<long double> sum;
   std::vector<Real> outputs;  // in the end those of the nearest point
-  for (int k = 0; k < 3; ++k) {
-    Map beside = at;
-    beside[path] = Real(value.value + kPoints[k] * way, 1.0L);
-    outputs = Outputs(coincidence, beside);
-    sum.resize(outputs.size(), 0.0L);
-    for (size_t i = 0; i < outputs.size(); ++i) {
-      sum[i] += kWeights[k] * outputs[i].rate;
+  for (int tries = 1;; ++tries) {
+    std::vector<long double> bend(values.size(), 0.0L);
+    sum.assign(values.size(), 0.0L);
+    for (int k = 0; k < 3; ++k) {
+      Map beside = at;
+      beside[path] = Real(value.value + kPoints[k] * way, 1.0L);
+      outputs = Outputs(coincidence, beside);
+      for (size_t i = 0; i < outputs.size(); ++i) {
+        sum[i] += kWeights[k] * outputs[i].rate;
+        bend[i] += kBends[k] * outputs[i].rate;
+      }
     }
+    std::vector<long double> apart(values.size());
+    for (size_t i = 0; i < outputs.size(); ++i) {
+      apart[i] = outputs[i].value - values[i].value - kPoints[2] * way * sum[i];
+    }
+    const long double most = kBent * LargestOf(sum);
+    const bool bends = LargestOf(bend) > most || LargestOf(apart) > most * std::abs(way);
+    if (!bends || tries == kMostWays) break;
+    way *= kShorter;
   }
   VectorX<double> side(static_cast<Eigen::Index>(sum.size()));
   for (size_t i = 0; i < sum.size(); ++i) {

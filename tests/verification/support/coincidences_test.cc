@@ -136,5 +136,30 @@ TEST(CoincidencesTest, KnownDerivativesAreExact) {
   }
 }
 
+// The derivative on a side is that before the next kink, which may be nearer than the way.
+TEST(CoincidencesTest, SidesEndAtTheNextKink) {
+  Coincidence one;
+  std::string error;
+  ASSERT_TRUE(
+      ParseScene(R"({"bodies": [{"name": "a", "mass": 1, "inertia": 1, "position": [0.5, 0]}],
+                             "simulation": {"dt": 0.1, "duration": 1}})",
+                 "test.json", ".", &one.scene, &error))
+      << error;
+  const std::string path = "bodies/a/position/x";
+  ParameterPath parameter;
+  ASSERT_TRUE(ResolveParameter(one.scene, path, &parameter, &error)) << error;
+  one.parameters = {parameter};
+  for (const long double kink : {1e-6L, 3e-7L, 2e-8L, 2e-10L}) {
+    one.outputs = [&](const NumberAt& at) {
+      const Real x = at(path);
+      const Real beyond = Real(0.5L - kink) - x;
+      return std::vector<Real>{beyond.value > 0.0L ? x + beyond * Real(5.0L) : x};
+    };
+    const KnownSides sides = SidesOf(one);
+    EXPECT_DOUBLE_EQ(sides.plus(0, 0), 1.0);
+    EXPECT_DOUBLE_EQ(sides.minus(0, 0), 1.0) << static_cast<double>(kink);
+  }
+}
+
 }  // namespace
 }  // namespace tangible
