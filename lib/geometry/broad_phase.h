@@ -17,6 +17,12 @@ struct Aabb {
   double min_x, min_y, max_x, max_y;
 };
 
+/// Whether two boxes have a point in common.
+inline bool Overlap(const Aabb& p, const Aabb& q) {
+  return p.min_x <= q.max_x && q.min_x <= p.max_x && p.min_y <= q.max_y && q.min_y <= p.max_y &&
+         p.min_x <= p.max_x && q.min_x <= q.max_x;
+}
+
 /// The box of a shape at a pose, grown by `margin` on each side.
 Aabb ComputeAabb(const ShapeView<double>& shape, const Pose<double>& pose, double margin);
 

@@ -15,7 +15,7 @@ namespace {
 using Pairs = std::vector<std::pair<int, int>>;
 constexpr auto kAll = [](int, int) { return true; };
 
-bool Overlap(const Aabb& a, const Aabb& b) {
+bool Meet(const Aabb& a, const Aabb& b) {
   if (a.min_x > a.max_x || b.min_x > b.max_x) {
     return false;  // empty
   }
@@ -26,7 +26,7 @@ Pairs AllPairs(const std::vector<Aabb>& boxes) {
   Pairs pairs;
   for (int i = 0; i < static_cast<int>(boxes.size()); ++i) {
     for (int j = i + 1; j < static_cast<int>(boxes.size()); ++j) {
-      if (Overlap(boxes[i], boxes[j])) {
+      if (Meet(boxes[i], boxes[j])) {
         pairs.emplace_back(i, j);
       }
     }

@@ -13,6 +13,12 @@
 namespace tangible {
 namespace {
 
+// Boxes that are kept reach as much farther than those of one step: for that many steps at the
+// present speed.
+constexpr double kRoomOfBoxes = 8.0;
+// Up to so many bodies a search has memory for all pairs from its start on.
+constexpr size_t kFewBodies = 32;
+
 double SpeedOf(const double* twist, double radius) {
   return std::sqrt(twist[0] * twist[0] + twist[1] * twist[1]) + std::abs(twist[2]) * radius;
 }
@@ -61,7 +67,16 @@ ContactSearch::ContactSearch(const Model<double>& model) : lengths_(model) {
   limit_bound_.assign(structure.joints.size(), 0.0);
   boxes_.resize(n);
   free_twist_.assign(3 * n, 0.0);
+  kept_.reserve(n);
+  larger_.assign(n, Aabb{0.0, 0.0, 0.0, 0.0});
+  boxed_.reserve(n);
   pairs_.reserve(8 * n);
+  candidates_.reserve(8 * n);
+  if (n > kFewBodies) return;
+  // Of few bodies all may meet: with boxes at one place the vectors of the sweep grow to their end.
+  broad_phase_.FindPairs(
+      larger_, [](int, int) { return true; }, &candidates_);
+  pairs_.reserve(candidates_.size());
 }
 
 void ContactSearch::SetBounds(const Model<double>& model, const State<double>& state,
@@ -78,7 +93,7 @@ void ContactSearch::SetBounds(const Model<double>& model, const State<double>& s
     bound_[body] =
         std::max(SpeedOf(twist, lengths_.radius(body)), SpeedOf(free, lengths_.radius(body)));
   }
-  for (size_t j = 0; j < structure.joints.size(); ++j) {
+  for (size_t j = 0; structure.has_limits && j < structure.joints.size(); ++j) {
     const JointIndex& joint = structure.joints[j];
     if (joint.HasLimits()) {
       limit_bound_[j] = std::max(CoordinateRate(joint, scratch.joints[j], state.twist.data()),
@@ -90,7 +105,8 @@ void ContactSearch::SetBounds(const Model<double>& model, const State<double>& s
 bool ContactSearch::CheckBounds(const Model<double>& model, const std::vector<double>& twist,
                                 const AssemblyScratch<double>& scratch) {
   bool exceeded = false;
-  for (size_t j = 0; j < model.structure->joints.size(); ++j) {
+  const size_t limited = model.structure->has_limits ? model.structure->joints.size() : 0;
+  for (size_t j = 0; j < limited; ++j) {
     const JointIndex& joint = model.structure->joints[j];
     if (!joint.HasLimits()) {
       continue;
@@ -174,21 +190,74 @@ ContactsAhead ContactSearch::FindPassed(const Model<double>& model, const State<
   return ahead;
 }
 
-// The pairs of bodies that may have contacts.
+// How far a body's box reaches beyond its shape, m: so that boxes of bodies that may touch overlap.
+double ContactSearch::GrowthOf(const Model<double>& model, double h, int body) const {
+  return 0.5 * model.structure->settings.contact_margin + h * bound_[body];
+}
+
+Aabb ContactSearch::BoxAt(const Model<double>& model, const State<double>& state,
+                          const AssemblyScratch<double>& scratch, int body, double growth) const {
+  if (model.structure->bodies[body].shape == ShapeType::kHalfPlane &&
+      state.twist[3 * body + 2] != 0.0) {
+    // A half-plane that turns may reach any place.
+    const double infinity = std::numeric_limits<double>::infinity();
+    return {-infinity, -infinity, infinity, infinity};
+  }
+  return BoxOf(model, body, scratch.poses[body], growth);
+}
+
+// Whether every shape, grown by its reach, is still inside the larger box that was kept of it.
+bool ContactSearch::BoxesHold(const Model<double>& model, const State<double>& state,
+                              double h) const {
+  if (kept_.empty()) return false;
+  const ModelStructure& structure = *model.structure;
+  for (int body = 0; body < structure.num_bodies(); ++body) {
+    if (!structure.bodies[body].HasContacts()) continue;
+    const KeptBox& kept = kept_[body];
+    const double* pose = &state.pose[3 * body];
+    const double turned = std::abs(pose[2] - kept.pose[2]);
+    const bool is_plane = structure.bodies[body].shape == ShapeType::kHalfPlane;
+    if (is_plane && !kept.turns && (turned != 0.0 || state.twist[3 * body + 2] != 0.0)) {
+      return false;
+    }
+    const double moved =
+        std::max(std::abs(pose[0] - kept.pose[0]), std::abs(pose[1] - kept.pose[1])) +
+        turned * lengths_.radius(body);
+    if (!(moved + GrowthOf(model, h, body) <= kept.growth)) return false;
+  }
+  return true;
+}
+
+// The pairs of bodies that may have contacts. Boxes with room for some steps are sorted and swept,
+// and until a body leaves its own only the pairs that they have are compared.
 void ContactSearch::FindPairs(const Model<double>& model, const State<double>& state, double h,
                               const AssemblyScratch<double>& scratch) {
   const ModelStructure& structure = *model.structure;
-  for (int body = 0; body < structure.num_bodies(); ++body) {
-    const double reach = 0.5 * structure.settings.contact_margin + h * bound_[body];
-    boxes_[body] = BoxOf(model, body, scratch.poses[body], reach);
-    if (structure.bodies[body].shape == ShapeType::kHalfPlane && state.twist[3 * body + 2] != 0.0) {
-      // A half-plane that turns may reach any place.
-      const double infinity = std::numeric_limits<double>::infinity();
-      boxes_[body] = {-infinity, -infinity, infinity, infinity};
+  compared_ = 0;
+  if (!BoxesHold(model, state, h)) {
+    kept_.resize(structure.num_bodies());
+    larger_.resize(structure.num_bodies());
+    for (int body = 0; body < structure.num_bodies(); ++body) {
+      const double* pose = &state.pose[3 * body];
+      const double growth = kRoomOfBoxes * GrowthOf(model, h, body);
+      kept_[body] = {{pose[0], pose[1], pose[2]}, growth, state.twist[3 * body + 2] != 0.0};
+      larger_[body] = BoxAt(model, state, scratch, body, growth);
     }
+    broad_phase_.FindPairs(
+        larger_, [&](int i, int j) { return structure.MayCollide(i, j); }, &candidates_);
+    compared_ = broad_phase_.num_compared();
   }
-  broad_phase_.FindPairs(
-      boxes_, [&](int i, int j) { return structure.MayCollide(i, j); }, &pairs_);
+  compared_ += static_cast<int>(candidates_.size());
+  boxed_.assign(structure.num_bodies(), false);
+  pairs_.clear();
+  for (const std::pair<int, int>& pair : candidates_) {
+    for (const int body : {pair.first, pair.second}) {
+      if (boxed_[body]) continue;
+      boxed_[body] = true;
+      boxes_[body] = BoxAt(model, state, scratch, body, GrowthOf(model, h, body));
+    }
+    if (Overlap(boxes_[pair.first], boxes_[pair.second])) pairs_.push_back(pair);
+  }
 }
 
 // The gap below which two bodies may touch within the step, m.

@@ -33,9 +33,11 @@ class ContactSearch {
   void Find(const Model<double>& model, const State<double>& state, double h,
             const AssemblyScratch<double>& scratch, std::vector<ActiveContact>* contacts,
             std::vector<CoefficientSource>* friction, std::vector<CoefficientSource>* restitution);
-  /// Counts of the last search: the pairs of boxes that the broad phase compared, the pairs that
-  /// overlap, and those among them that have no row because they are out of reach.
-  int num_compared() const { return broad_phase_.num_compared(); }
+  /// Forgets the boxes of earlier searches: the next may be of other shapes.
+  void Forget() { kept_.clear(); }
+  /// Counts of the last search: the pairs of boxes that were compared, the pairs that overlap, and
+  /// those among them that have no row because they are out of reach.
+  int num_compared() const { return compared_; }
   int num_pairs() const { return static_cast<int>(pairs_.size()); }
   int num_beyond_reach() const { return beyond_reach_; }
 
@@ -49,6 +51,10 @@ class ContactSearch {
  private:
   ContactsAhead FindPassed(const Model<double>& model, const State<double>& state,
                            const ActiveContact& contact, double approach, double h) const;
+  Aabb BoxAt(const Model<double>& model, const State<double>& state,
+             const AssemblyScratch<double>& scratch, int body, double growth) const;
+  double GrowthOf(const Model<double>& model, double h, int body) const;
+  bool BoxesHold(const Model<double>& model, const State<double>& state, double h) const;
   void FindPairs(const Model<double>& model, const State<double>& state, double h,
                  const AssemblyScratch<double>& scratch);
   double ReachOf(const Model<double>& model, const State<double>& state, double h, int a,
@@ -71,10 +77,21 @@ class ContactSearch {
   std::vector<ActiveContact> limits_;  ///< of all joints
   std::vector<ActiveContact> without_rolling_;
   std::vector<double> limit_bound_;  ///< a joint: bound on its coordinate's rate, rad/s or m/s
-  std::vector<Aabb> boxes_;
+  /// Where a body's larger box was made, which holds until the body or its reach leaves it.
+  struct KeptBox {
+    double pose[3];
+    double growth;  ///< m beyond the shape
+    bool turns;     ///< a half-plane that turns
+  };
+  std::vector<KeptBox> kept_;                    ///< empty: none
+  std::vector<Aabb> larger_;                     ///< those boxes
+  std::vector<std::pair<int, int>> candidates_;  ///< the pairs of larger boxes that overlap
+  std::vector<Aabb> boxes_;                      ///< of the bodies of these pairs, as they are
+  std::vector<bool> boxed_;
   std::vector<std::pair<int, int>> pairs_;
   std::vector<double> free_twist_;
   BroadPhase broad_phase_;
+  int compared_ = 0;
   int beyond_reach_ = 0;
 };
 

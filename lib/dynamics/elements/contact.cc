@@ -139,6 +139,7 @@ bool AppendRolling(const Model<double>& model, std::vector<ActiveContact>* conta
 
 void AppendLimits(const Model<double>& model, const State<double>& state,
                   std::vector<ActiveContact>* contacts) {
+  if (!model.structure->has_limits) return;
   const std::vector<JointIndex>& joints = model.structure->joints;
   for (size_t j = 0; j < joints.size(); ++j) {
     for (const double side : {1.0, -1.0}) {
@@ -155,6 +156,7 @@ void AppendLimits(const Model<double>& model, const State<double>& state,
 
 void AppendJointFriction(const Model<double>& model, const State<double>& state,
                          std::vector<ActiveContact>* contacts) {
+  if (!model.structure->has_joint_friction) return;
   const std::vector<JointIndex>& joints = model.structure->joints;
   for (size_t j = 0; j < joints.size(); ++j) {
     if (IsReleased(state, static_cast<int>(j))) continue;

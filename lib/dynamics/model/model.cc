@@ -234,7 +234,7 @@ void AddJoints(const BasicScene<T>& scene, Places* places, ModelStructure* struc
       index.effort_signal = static_cast<int>(structure->signals.size());
       structure->signals.push_back(*joint.effort_signal);
     }
-    structure->joints.push_back(index);
+    structure->AddJoint(index);
     if (!joint.contact) {
       structure->joined.emplace_back(std::min(index.a, index.b), std::max(index.a, index.b));
     }

@@ -181,8 +181,15 @@ struct ModelStructure {
   bool has_releases = false;          ///< whether joints end at a time
   bool friction_decays = false;       ///< whether the friction of some contact may (contact.h)
   bool has_rolling_friction = false;  ///< whether some body or pair has it
+  bool has_limits = false;            ///< whether some joint has
+  bool has_joint_friction = false;    ///< whether some joint has friction or a motor
   int num_parameters = 0;
 
+  JointIndex& AddJoint(const JointIndex& joint) {
+    has_limits = has_limits || joint.HasLimits();
+    has_joint_friction = has_joint_friction || joint.friction >= 0 || joint.motor >= 0;
+    return joints.emplace_back(joint);
+  }
   int num_bodies() const { return static_cast<int>(bodies.size()); }
   int world() const { return num_bodies() - 1; }
   int num_blocks() const { return static_cast<int>(moving.size()); }

@@ -105,7 +105,7 @@ class PartTaker {
     std::vector<int> local_joint(whole_.joints.size(), -1);
     for (size_t j = 0; j < whole_.joints.size(); ++j) {
       if (!Moves(whole_.joints[j].a) && !Moves(whole_.joints[j].b)) continue;
-      JointIndex& index = to_->joints.emplace_back(whole_.joints[j]);
+      JointIndex& index = to_->AddJoint(whole_.joints[j]);
       local_joint[j] = static_cast<int>(part_.joints.size());
       part_.joints.push_back(static_cast<int>(j));
       index.a = local_[index.a];

@@ -36,16 +36,17 @@ double RowResidual(double z, double zeta, double s, double sigma) {
   return std::abs(std::min(scaled_z, scaled_s));
 }
 
-struct MomentumScratch {
+struct ResidualScratch {
+  ContactScales scales;
   std::vector<double> left;
   std::vector<double> terms;  // the largest of each row
 };
 
 // The residual is relative to the terms of each body itself: those of a heavy body would hide the
 // error of a light one.
-double MomentumResidual(const ContactProblem<double>& problem, const ContactScales& scales,
-                        const ContactSolution<double>& solution) {
-  Leased<MomentumScratch> scratch;
+double MomentumResidual(const ContactProblem<double>& problem,
+                        const ContactSolution<double>& solution, ResidualScratch* scratch) {
+  const ContactScales& scales = scratch->scales;
   std::vector<double>& left = scratch->left;
   std::vector<double>& terms = scratch->terms;
   left.assign(problem.load.begin(), problem.load.end());
@@ -81,8 +82,9 @@ double MomentumResidual(const ContactProblem<double>& problem, const ContactScal
     const JointBlock<double>& joint = problem.joints[j];
     for (int k = 0; k < joint.rows; ++k) {
       add(joint.a, joint.row_a[k], joint.b, joint.row_b[k], solution.joint_impulse[3 * j + k]);
-      if (joint.c < 0) continue;
-      add(joint.c, joint.row_c, joint.d, joint.row_d, solution.joint_impulse[3 * j + k]);
+    }
+    if (joint.c >= 0) {
+      add(joint.c, joint.row_c, joint.d, joint.row_d, solution.joint_impulse[3 * j]);
     }
   }
   for (size_t i = 0; i < problem.contacts.size(); ++i) {
@@ -230,10 +232,10 @@ double ImpulseScale(const std::vector<double>& impulses) {
 double NaturalResidual(const ContactProblem<double>& problem,
                        const ContactSolution<double>& solution, int* worst_contact) {
   *worst_contact = -1;
-  Leased<ContactScales> lease;
-  ContactScales& scales = *lease;
+  Leased<ResidualScratch> scratch;
+  ContactScales& scales = scratch->scales;
   scales.Compute(problem, solution);
-  double worst = std::max(MomentumResidual(problem, scales, solution),
+  double worst = std::max(MomentumResidual(problem, solution, &*scratch),
                           JointResidual(problem, scales, solution.motion.data()));
   for (size_t i = 0; i < problem.contacts.size(); ++i) {
     const ContactBlock<double>& c = problem.contacts[i];

@@ -150,11 +150,13 @@ void Stepper::ClearGuess() {
   if (events_) {
     events_->ClearGuess();
   }
+  search_.Forget();
   last_contacts_.clear();
   last_solution_ = ContactSolution<double>();
 }
 
 void Stepper::SetGuess(const StepRecord& record) {
+  search_.Forget();
   last_contacts_ = record.contacts;
   last_solution_ = record.solution;
 }
@@ -176,6 +178,7 @@ void Stepper::SetGuess(const StepperGuess& guess) {
     events_->SetGuess(guess.events);
     return;
   }
+  search_.Forget();
   last_contacts_ = guess.contacts;
   last_solution_ = guess.solution;
 }

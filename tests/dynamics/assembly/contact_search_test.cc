@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <string>
+
 #include "../../support/scenes.h"
 
 namespace tangible {
@@ -108,6 +111,57 @@ TEST(ContactSearchTest, AFlatBoxHasTwoContactsAndLimitsComeLast) {
   EXPECT_EQ(s.contacts[2].side, 1.0);
   EXPECT_EQ(s.contacts[3].side, -1.0);
   EXPECT_NEAR(s.contacts[3].gap, 1e-4, 1e-15);
+}
+
+// Bodies that fly, turn and turn back: a search that keeps its boxes lists the contacts of one that
+// has none.
+TEST(ContactSearchTest, KeptBoxesListWhatNewOnesList) {
+  Scene scene = test_scenes::SceneOf(test_scenes::FallingBall(0.0, R"({"dt": 0.01})"));
+  const BasicBody<double> ball = scene.bodies[0];
+  for (int k = 1; k < 12; ++k) {
+    BasicBody<double>& body = scene.bodies.emplace_back(ball);
+    body.name += std::to_string(k);
+    body.position = Vector2<double>(0.21 * (k % 4), 0.1 + 0.21 * (k / 4));
+    if (k % 3 == 0) body.shape = {ShapeType::kBox, {0.2, 0.1}};
+  }
+  Search s;
+  BuildModel(scene, &s.model, &s.state);
+  ContactSearch keeps(s.model);
+  long compared = 0;
+  long compared_anew = 0;
+  size_t listed = 0;
+  for (int step = 0; step < 400; ++step) {
+    for (const int body : s.model.structure->moving) {
+      const double phase = 0.02 * step + body;
+      const bool rests = step % 100 > 60;
+      s.state.twist[3 * body] = rests ? 0.0 : 1.5 * std::sin(phase);
+      s.state.twist[3 * body + 1] = rests ? 0.0 : 1.5 * std::cos(1.3 * phase);
+      s.state.twist[3 * body + 2] = rests ? 0.0 : 4.0 * std::sin(1.7 * phase);
+      for (int i = 0; i < 3; ++i) s.state.pose[3 * body + i] += 0.01 * s.state.twist[3 * body + i];
+    }
+    AssembleWithoutContacts(s.model, s.state, 0.0, 0.01, &s.problem, &s.scratch);
+    ContactSearch anew(s.model);
+    std::vector<ActiveContact> expected;
+    for (ContactSearch* search : {&anew, &keeps}) {
+      search->SetBounds(s.model, s.state, s.problem, s.scratch);
+      s.contacts.clear();
+      s.friction.clear();
+      s.restitution.clear();
+      search->Find(s.model, s.state, 0.01, s.scratch, &s.contacts, &s.friction, &s.restitution);
+      if (search == &anew) expected = s.contacts;
+    }
+    ASSERT_EQ(s.contacts.size(), expected.size()) << step;
+    for (size_t i = 0; i < expected.size(); ++i) {
+      EXPECT_TRUE(s.contacts[i].SameAs(expected[i])) << step;
+      EXPECT_EQ(s.contacts[i].gap, expected[i].gap) << step;
+    }
+    EXPECT_EQ(keeps.num_pairs(), anew.num_pairs()) << step;
+    listed += expected.size();
+    compared += keeps.num_compared();
+    compared_anew += anew.num_compared();
+  }
+  EXPECT_GT(listed, 1000u);
+  EXPECT_LT(compared, compared_anew);
 }
 
 }  // namespace
