@@ -549,7 +549,7 @@ void RolloutCertifier::AddIsland(const Model<double>& model, long step, EventDer
   for (int p = 0; p < record.num_parts; ++p) {
     EventPart& part = *record.parts[p];
     if (part.is_impulses) {
-      AddImpact(model, step, &part.impulses);
+      if (!part.impulses.holds) AddImpact(model, step, &part.impulses);
       continue;
     }
     AddSegment(model, step, derivative, &part.segment);

@@ -183,7 +183,7 @@ void ChoiceWatch::AddStep(const Model<double>& model, long step, Stepper* steppe
     for (int p = 0; p < island.events.num_parts; ++p) {
       EventPart& part = *island.events.parts[p];
       if (part.is_impulses) {
-        AddImpact(own, island, part.impulses);
+        if (!part.impulses.holds) AddImpact(own, island, part.impulses);
       } else {
         AddSegment(own, island, step, &part.segment);
       }

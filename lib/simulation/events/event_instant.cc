@@ -231,6 +231,7 @@ void EventStepper::AddFurtherEdges(const Model<double>& model, double t, const E
     return segment->stages[0].solution.motion;
   };
   WindowEdge last = edges.window;
+  const int first = record_.num_parts;
   for (auto next = edges.further.begin(); next != edges.further.end(); ++next) {
     const std::vector<WindowEdge> rest(next + 1, edges.further.end());
     const auto with = [&](std::vector<WindowEdge> few) {
@@ -255,6 +256,35 @@ void EventStepper::AddFurtherEdges(const Model<double>& model, double t, const E
     }
     last = *next;
   }
+  HoldBehindEdges(model, t, after, first, state, outcome);
+}
+
+void EventStepper::HoldBehindEdges(const Model<double>& model, double t, double after, int first,
+                                   const State<double>& state, StepReport* outcome) {
+  if (record_.num_parts == first || AddEdge(model, t, after, {}, state, outcome) == nullptr) return;
+  EventPart* part = record_.parts[--record_.num_parts].get();
+  const Segment& behind = part->segment;
+  const auto holds = [](const Segment& one, const ActiveContact& contact, ContactMode mode) {
+    for (size_t i = 0; i < one.contacts.size(); ++i) {
+      if (one.contacts[i].SameAs(contact)) return one.modes[i] == mode;
+    }
+    return false;
+  };
+  bool lets_go = false;
+  for (int p = first; p < record_.num_parts; ++p) {
+    const Segment& between = record_.parts[p]->segment;
+    lets_go = lets_go || between.before.supports != behind.before.supports;
+    for (size_t i = 0; i < behind.contacts.size(); ++i) {
+      const bool slides = SlidingSign(behind.modes[i]) != 0.0;
+      lets_go = lets_go || (!slides && !holds(between, behind.contacts[i], behind.modes[i]));
+    }
+  }
+  if (!lets_go) return;
+  part->is_impulses = true;
+  SetUpProjection(behind, behind.before, &part->impulses);
+  part->impulses.new_twist = state.twist;
+  part->impulses.holds = true;
+  if (flow_.Project(model, &part->impulses)) ++record_.num_parts;
 }
 
 bool EventStepper::Rattles(const Model<double>& model, const ActiveContact& contact) const {
@@ -285,7 +315,7 @@ Impulses& EventStepper::BeginImpulses(double t, const State<double>& state) {
   impulses.time = t;
   impulses.inside = inside_;
   impulses.h = 0.0;
-  impulses.decompression = false;
+  impulses.decompression = impulses.holds = false;
   impulses.before = state;
   impulses.contacts.clear();
   impulses.friction.clear();

@@ -46,6 +46,8 @@ struct Impulses : StepRecord {
   double inside = 0.0;          ///< the time that tells the pieces on which paths are followed
   bool decompression = false;   ///< of the impulses found by the part before
   std::vector<int> compressed;  ///< decompression: each contact's index in that part
+  /// Behind edges of one instant: what holds has no speed, but a derivative of one until here.
+  bool holds = false;
 };
 
 enum class EventKind : unsigned char {

@@ -195,6 +195,12 @@ class EventStepper {
   /// Those between the first and the further edges of a group that has been reached.
   void AddFurtherEdges(const Model<double>& model, double t, const EdgeGroup& edges,
                        const State<double>& state, StepReport* outcome);
+  /// A contact or support that lets go for the time between two edges of one instant, and holds
+  /// behind them, takes up its hold at once: the speed that the time between gives is stopped again
+  /// after a time of the same order, over a way of the second. The speed is 0, its derivative that
+  /// of a projection onto what holds. The segments between edges are the parts from `first` on.
+  void HoldBehindEdges(const Model<double>& model, double t, double after, int first,
+                       const State<double>& state, StepReport* outcome);
   /// Whether a pair has had so many events in this step that its slow impacts count as a rattle (an
   /// infinite sequence of ever smaller impacts).
   bool Rattles(const Model<double>& model, const ActiveContact& contact) const;

@@ -427,7 +427,7 @@ void SetUpProjection(const Segment& segment, const State<double>& state, Impulse
   projection->time = segment.time + segment.length;
   projection->inside = segment.middle;
   projection->h = 0.0;
-  projection->decompression = false;
+  projection->decompression = projection->holds = false;
   projection->before = state;
   projection->contacts = segment.contacts;
   projection->friction = segment.friction;

@@ -76,7 +76,8 @@ class OneSided {
     }
     const VectorX<double> first = 2.0 * at[2].derivative - at[1].derivative;
     *column = (at[0].derivative - 6.0 * at[1].derivative + 8.0 * at[2].derivative) / 3.0;
-    const double values = result_.values.cwiseAbs().maxCoeff();
+    // Scenes have sizes of about 1 in SI units, so that values of rounding alone are none.
+    const double values = std::max(1.0, result_.values.cwiseAbs().maxCoeff());
     const double size =
         std::max(column->cwiseAbs().maxCoeff(), kNoDerivative * kSideWay * values / first_way);
     const double apart = (first - *column).cwiseAbs().maxCoeff();

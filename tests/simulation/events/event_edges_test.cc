@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <string>
 #include <vector>
@@ -161,6 +162,63 @@ TEST(EventEdgesTest, TheOrderOfTwoWindowsThatMatters) {
         EXPECT_NE(verdict.find("one-sided: windows of two forces"), std::string::npos) << verdict;
       } else {
         EXPECT_EQ(verdict, "trustworthy");
+      }
+    }
+  }
+}
+
+// Two opposite forces begin and end at one instant, each of which would move what rests: between
+// the two edges it gains a speed of δ, which is stopped again after a time of δ. The place changes
+// by δ² alone.
+TEST(EventEdgesTest, WhatRestsBetweenAndBehindTwoEdgesStaysWhereItIs) {
+  const std::string joint = R"("joints": [{"name": "s", "type": "prismatic", "axis": [1, 0],
+      "bodies": ["c", "world"], "anchor": [0, 0], "friction": 2}])";
+  const std::string hinge = R"("joints": [{"name": "s", "type": "revolute",
+      "bodies": ["c", "world"], "anchor": [0, 0], "friction": 2}])";
+  const struct {
+    std::string body, bodies, rest, acts;
+    double load;
+  } cases[] = {
+      {"", "", joint, "[%, 0]", 3.0},
+      {R"("support": {"friction": 0.2, "load": 10}, "shape": {"circle": {"radius": 0.1}},)", "",
+       R"("gravity": [0, 0])", "[%, 0]", 3.0},
+      {R"("shape": {"box": {"size": [0.5, 0.25]}}, "friction": 0.2,)",
+       R"(, {"name": "floor", "static": true, "friction": 0.2, "position": [0, -0.125],
+            "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}})",
+       R"("gravity": [0, -10])", "[%, 0]", 2.5},
+      {"", "", hinge, "torque", 3.0},
+  };
+  for (const auto& one : cases) {
+    for (const auto& [start, end, dt] :
+         {std::array{0.2, 0.6, 0.1}, std::array{0.2, 0.6, 0.01}, std::array{0.233, 0.571, 0.1},
+          std::array{0.2, 0.5, 0.3}}) {
+      std::string forces;
+      for (const int k : {0, 1}) {
+        const std::string load = Text(k == 0 ? one.load : -one.load);
+        std::string acts = R"("torque": )" + load;
+        if (one.acts != "torque") acts = R"("force": )" + std::string(one.acts);
+        const size_t place = acts.find('%');
+        if (place != std::string::npos) acts.replace(place, 1, load);
+        forces += (k > 0 ? ", " : "") + std::string(R"({"name": "f)") + std::to_string(k) +
+                  R"(", "body": "c", )" + acts + R"(, "start": )" + Text(start) + R"(, "end": )" +
+                  Text(end) + "}";
+      }
+      const Scene scene = SceneOf(R"({"bodies": [{"name": "c", )" + one.body +
+                                  R"("mass": 1, "inertia": 1, "position": [0, 0]})" + one.bodies +
+                                  "], " + one.rest + R"(, "forces": [)" + forces +
+                                  R"(], "simulation": {"stepping": "event", "duration": 0.7,
+                                     "dt": )" +
+                                  Text(dt) + "}}");
+      const std::vector<std::string> paths = {"forces/f0/start", "forces/f0/end", "forces/f1/start",
+                                              "forces/f1/end"};
+      // Differences see δ².
+      for (const GradientMethod method : {GradientMethod::kAdjoint, GradientMethod::kTangent,
+                                          GradientMethod::kJetImplicit, GradientMethod::kJet}) {
+        if (!IsAvailable(method)) continue;
+        const GradientResult result = Jacobian(scene, paths, method);
+        const std::string where = one.rest + one.body + ", dt " + Text(dt);
+        EXPECT_LE(result.jacobian.cwiseAbs().maxCoeff(), 1e-12) << where;
+        EXPECT_EQ(result.certificate.verdict, "trustworthy") << where;
       }
     }
   }
