@@ -78,12 +78,13 @@ TEST_F(WarningsTest, EnergyThatGrowsByEventsIsOneLine) {
 
 // Discs at one place are pushed apart, each by those on top of it: by 3 m/s a disc.
 TEST_F(WarningsTest, OverlapThatThrowsBodiesIsOneLine) {
-  const auto discs = [](int count, double apart) {
+  const auto discs = [](int count, double apart, double speed = 0.0) {
     json scene = {{"simulation", {{"dt", 0.01}, {"duration", 0.1}}}, {"bodies", json::array()}};
     for (int i = 0; i < count; ++i) {
       scene["bodies"].push_back({{"name", "d" + std::to_string(i)},
                                  {"shape", {{"circle", {{"radius", 0.1}}}}},
                                  {"mass", 1},
+                                 {"velocity", {i % 2 == 0 ? -speed : speed, 0}},
                                  {"position", {apart * i, 1}}});
     }
     return scene.dump();
@@ -92,6 +93,10 @@ TEST_F(WarningsTest, OverlapThatThrowsBodiesIsOneLine) {
     ExpectOneLine(Simulate(discs(60, apart)), 0, "as bodies that overlap, by up to 0.2 m");
     EXPECT_EQ(summary_["warnings"].size(), 1u);
     EXPECT_GT(EnergyGain(), 1e4);
+  }
+  // Energy of their own does not hide it.
+  for (const double speed : {10.0, 100.0, 600.0}) {
+    ExpectOneLine(Simulate(discs(60, 0.0, speed)), 0, "as bodies that overlap, by up to 0.2 m");
   }
   // Two that overlap come apart at recovery_speed; the others have no reason to.
   EXPECT_EQ(Simulate(discs(2, 0.1)).error, "");

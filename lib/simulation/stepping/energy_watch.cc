@@ -16,6 +16,8 @@ namespace {
 // Far more than the energy that impacts by Newton's law with friction, corrections of drift and
 // coarse steps add.
 constexpr double kExploded = 1e4;
+// Of the radius of the smallest body: bodies that overlap by more do so from the start.
+constexpr double kDeep = 0.5;
 
 }  // namespace
 
@@ -87,7 +89,20 @@ std::string EnergyOfOverlap(const Model<double>& model, const State<double>& ini
                             const State<double>& final, double depth) {
   if (model.structure->settings.stepping == Stepping::kEvent || !(depth > 0.0)) return "";
   const EnergyWatch watch(model, initial);
-  if (!(watch.Excess(model, final) > 0.0)) return "";
+  double excess = watch.Excess(model, final);
+  if (depth > kDeep * Lengths(model).smallest_radius() && !IsDriven(model, initial)) {
+    const SimulationSettings& settings = model.structure->settings;
+    const double g = std::hypot(model.parameters[kGravityX], model.parameters[kGravityY]);
+    const double kinetic = KineticEnergy(model, initial) + KineticEnergy(model, final);
+    double given = kGrownByOverlap * kinetic;
+    for (const int body : model.structure->moving) {
+      given += model.parameters[model.structure->bodies[body].mass] *
+               (settings.recovery_speed * settings.recovery_speed + 2.0 * g * depth);
+    }
+    excess = std::max(excess, KineticEnergy(model, final) + PotentialEnergy(model, final) -
+                                  watch.start() - given);
+  }
+  if (!(excess > 0.0)) return "";
   char text[320];
   std::snprintf(text, sizeof text,
                 "the energy grew from %.4g J to %.4g J as bodies that overlap, by up to %.3g m, "

@@ -34,6 +34,8 @@ inline constexpr double kLastShiftedStep = 1e-14;
 /// Of the kinetic energies at both ends of a run: energy that grows by more without a cause is
 /// reported; it shows in the second digit of a speed.
 inline constexpr double kEnergyGrowth = 0.01;
+/// The same where fixed steps have pushed bodies apart that overlap deeply.
+inline constexpr double kGrownByOverlap = 1e-3;
 /// Of a step of Newton's method: the shortest part of it that is tried; then descent follows.
 inline constexpr double kShortestNewton = 1e-3;
 /// Of a step of descent: the shortest part of it that is tried.
