@@ -34,6 +34,13 @@ def test_the_bits_of_a_long_run(stepping: str) -> None:
     assert simulation.outputs == rollout.outputs and simulation.controls == [PUSH]
 
 
+def test_a_simulation_keeps_its_scene() -> None:
+    scene = tangible.Scene(ball())
+    simulation = tangible.Simulation(scene)
+    scene.add_body("late", shape={"circle": {"radius": 1}}, mass=1, position=[9, 9])
+    assert "bodies/late/mass" not in simulation.scene.parameters()
+
+
 @pytest.mark.parametrize("file", ["scenes/chain.json", "event_scenes/chain.json", "scenes/bouncing_ball.json"])
 def test_scenes_of_the_repository(file: str) -> None:
     rollout = tangible.Rollout(DATA / file, records=range(0, 101, 10))

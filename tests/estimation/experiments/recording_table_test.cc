@@ -62,6 +62,17 @@ TEST(RecordingTableTest, WideTablesByAMapping) {
             "time,body,relative_to,angle,omega\n0.5,upper,,2,3\n0.5,lower,upper,4.25,\n");
 }
 
+// Nanoseconds times 1e-9 are a rounding, 2.4e-7 s, later than the same time in seconds.
+TEST(RecordingTableTest, TheEndOfAWindowOfAClockBelongsToIt) {
+  TableOptions options = Mapped(R"({"time": {"column": "t", "scale": 1e-9}, "columns": [
+      {"column": "x", "point": "tip", "coordinate": "x"}]})");
+  options.from = 1714476519.5;
+  options.to = 1714476519.8;
+  const Imported imported = Import("t,x\n1714476519500000000,1\n1714476519800000000,2\n", options);
+  ASSERT_TRUE(imported.ok) << imported.error;
+  EXPECT_EQ(imported.recording.rows.size(), 2u);
+}
+
 TEST(RecordingTableTest, QuotedNamesMayHoldSeparatorsQuotesAndLineBreaks) {
   const TableOptions options = Mapped(R"({"time": "t, s", "columns": [
       {"column": "the \"tip\", x", "point": "tip", "coordinate": "x"},
@@ -77,6 +88,11 @@ TEST(RecordingTableTest, QuotedNamesMayHoldSeparatorsQuotesAndLineBreaks) {
   EXPECT_EQ(imported.csv, wanted);
   // Within a cell that does not begin with it a quote is a character.
   imported = Import("t;5\" disc\n0,5;2,5\n", Mapped(R"({"time": "t", "columns": [
+      {"column": "5\" disc", "point": "tip", "coordinate": "x"}]})"));
+  ASSERT_TRUE(imported.ok) << imported.error;
+  EXPECT_EQ(imported.csv, "time,point,x\n0.5,tip,2.5\n");
+  // Also where that cell is the first one, before any separator.
+  imported = Import("5\" disc;t\n2,5;0,5\n", Mapped(R"({"time": "t", "columns": [
       {"column": "5\" disc", "point": "tip", "coordinate": "x"}]})"));
   ASSERT_TRUE(imported.ok) << imported.error;
   EXPECT_EQ(imported.csv, "time,point,x\n0.5,tip,2.5\n");

@@ -106,7 +106,7 @@ TEST(SamplingTest, ARunOfNoStepsHasStatesAndNoRates) {
       SimulationSettings settings;
       settings.duration = 0.0;
       settings.stepping = stepping;
-      const SampleOptions options{.twists = twists, .rates = true};
+      const SampleOptions options{.twists = twists, .accelerations = twists, .rates = true};
       AddStepTimes(SplitTimes({0.0}, settings, options), &settings);
       ASSERT_EQ(NumSteps(settings), 0);
       const SamplePlan plan({At(0.0, 0), At(0.0, 1)}, {0.0, 0.0}, {Channel()}, {-1}, settings,
@@ -118,6 +118,10 @@ TEST(SamplingTest, ARunOfNoStepsHasStatesAndNoRates) {
                &rates);
       EXPECT_EQ(numbers[0], 1.0);
       EXPECT_EQ(numbers[static_cast<size_t>(plan.width())], 4.0);
+      // Nothing accelerates where there is no second state.
+      if (twists) {
+        EXPECT_EQ(numbers[6], 0.0);
+      }
       for (const double rate : rates) EXPECT_TRUE(std::isfinite(rate));
       // By events the rate of a place is the twist, which is known.
       EXPECT_EQ(rates[0], stepping == Stepping::kEvent ? 7.0 : 0.0);

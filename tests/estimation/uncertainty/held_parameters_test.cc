@@ -157,5 +157,30 @@ TEST(HeldParametersTest, WhatARealFitDoesNotConfirmIsNotClaimed) {
   EXPECT_NEAR(confirmed[0].refitted_share, 1.0 - 0.98 * 0.98, 1e-6);
 }
 
+/// The same with a column of −`effect`: to first order θ would have to change by 1 / effect.
+class FaintProblem : public SaturatingProblem {
+ public:
+  explicit FaintProblem(double effect) : SaturatingProblem(false), effect_(effect) {}
+  HeldColumns EvaluateHeld(int block, const Eigen::VectorXd& p, GradientMethod method,
+                           int most) override {
+    HeldColumns held = SaturatingProblem::EvaluateHeld(block, p, method, most);
+    held.columns *= effect_;
+    return held;
+  }
+
+ private:
+  double effect_;
+};
+
+// A thousand times the typical magnitude of a value, 1 here, is the most that is told.
+TEST(HeldParametersTest, AChangeBeyondAllMagnitudesIsNoAdvice) {
+  for (const double change : {990.0, 1010.0, 7.7e12}) {
+    FaintProblem problem(1.0 / change);
+    const std::vector<HeldParameter> found =
+        FindHeldParameters(Eigen::VectorXd::Zero(1), HeldOptions(), &problem);
+    EXPECT_EQ(found.size(), change < 1000.0 ? 1U : 0U) << change;
+  }
+}
+
 }  // namespace
 }  // namespace tangible

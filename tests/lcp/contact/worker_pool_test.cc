@@ -55,6 +55,18 @@ TEST(WorkerPoolTest, WhatATaskThrowsReachesTheCallerAndThePoolGoesOn) {
   EXPECT_EQ(done, 10);
 }
 
+TEST(WorkerPoolTest, WhatAnotherThreadThrowsReachesTheCaller) {
+  WorkerPool pool(2);
+  std::atomic<int> begun = 0;
+  // Each thread has one of the two tasks, because the first waits for the second to begin.
+  const auto fails = [&](size_t, int thread) {
+    ++begun;
+    while (begun < 2) std::this_thread::yield();
+    if (thread == 1) throw std::runtime_error("1");
+  };
+  EXPECT_THROW(pool.Run(2, 2, fails), std::runtime_error);
+}
+
 TEST(WorkerPoolTest, AfterAnExceptionNoFurtherTaskBegins) {
   WorkerPool pool(4);
   std::atomic<int> begun = 0;
