@@ -19,8 +19,8 @@ constexpr char kPoisson[] = "coincidence: Poisson's phases";
 constexpr char kOfTwoKinds[] = "coincidence: two at one instant, of two kinds";
 
 // Of the parameter: the longest way to where derivatives are taken. The next kink is mostly a step
-// away. Where derivatives change on the way, or the outputs by more than these say, it is within it,
-// and a shorter way is tried.
+// away. Where derivatives change on the way, or the outputs by more than these say, it is within
+// it, and a shorter way is tried.
 constexpr long double kWay = 1e-6L;
 constexpr long double kShorter = 1e-2L;
 constexpr int kMostWays = 3;
