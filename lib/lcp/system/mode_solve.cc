@@ -90,7 +90,10 @@ bool ModeSolve::Solve(const ContactProblem<double>& problem, const ContactSoluti
     // The solution is x0 + K⁻¹ (rhs − K x0).
     x_.resize(rhs_.size());
     system->Residual<false>(problem, modes, rhs_.data(), start_.data(), 1, x_.data());
-    const auto hopeless = [&] { return CountBeyond(problem, modes, block_of) > most_beyond; };
+    const bool may_give_up = most_beyond < std::numeric_limits<int>::max();
+    const auto hopeless = [&] {
+      return may_give_up && CountBeyond(problem, modes, block_of) > most_beyond;
+    };
     const double left = system->SolveProximal(problem, modes, x_.data(), 1, std::cref(hopeless));
     if (std::isinf(left)) {
       return false;
