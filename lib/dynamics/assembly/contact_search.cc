@@ -83,6 +83,8 @@ void ContactSearch::SetBounds(const Model<double>& model, const State<double>& s
                               const ContactProblem<double>& problem,
                               const AssemblyScratch<double>& scratch) {
   const ModelStructure& structure = *model.structure;
+  // A run may have shapes of other sizes than the run before it.
+  if (kept_.empty()) lengths_ = Lengths(model);
   for (int body = 0; body < structure.num_bodies(); ++body) {
     const int block = structure.bodies[body].block;
     const double* twist = &state.twist[3 * body];

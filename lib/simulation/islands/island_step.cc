@@ -25,6 +25,11 @@ StepReport IslandStepper::Step(const Model<double>& model, double t, double h,
                                State<double>* state) {
   record_.time = t;
   record_.h = h;
+  if (guess_.starts) {
+    // A run may have shapes of other sizes than the run before it.
+    partition_ = IslandPartition(model);
+    is_whole_ = false;
+  }
   if (!partition_.MayDivide()) {
     return StepWhole(model, t, h, AtEvent::kGoOn, state);
   }

@@ -79,6 +79,32 @@ TEST_P(BatchTest, RowsHaveTheBitsOfSingleRunsWithAnyNumberOfThreads) {
   }
 }
 
+// A turning bar of which a row has another length by factors: how far a contact is looked for
+// follows the row's shape.
+TEST_P(BatchTest, ShapesMayDifferByFactors) {
+  Scene scene = SceneOf(R"({"gravity": [0, -10], "bodies": [
+      {"name": "floor", "static": true, "friction": 0.5,
+       "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}},
+      {"name": "bar", "shape": {"box": {"size": [0.02, 0.02]}}, "mass": 1, "inertia": 0.01,
+       "position": [0, 1], "angular_velocity": 30, "friction": 0.5, "restitution": 0.3}],
+      "simulation": {"dt": 0.01, "duration": 0.7}})");
+  scene.simulation.stepping = GetParam();
+  const std::vector<ParameterPath> length = Paths(scene, {"bodies/bar/shape/size/x"});
+  RowMatrixXd values(4, 1);
+  values << 0.02, 0.2, 1.4, 0.1;
+  const BatchResult batch = RunBatch(scene, length, values, {.threads = 1});
+  ASSERT_EQ(batch.message, "");
+  for (Eigen::Index r = 0; r < values.rows(); ++r) {
+    Scene single = scene;
+    ASSERT_EQ(SetParameters(length, values.row(r).data(), &single), "");
+    Model<double> model;
+    State<double> initial, final;
+    BuildModel(single, &model, &initial);
+    Rollout(model, initial, {}, &final);
+    EXPECT_TRUE(batch.rows[static_cast<size_t>(r)].final == final) << values(r, 0);
+  }
+}
+
 TEST_P(BatchTest, DerivativesHaveTheBitsOfSingleOnes) {
   const std::vector<LossTerm> loss = {{"ball/x", 0.3, 2.0}, {"crate/angle", -0.1, 1.0}};
   for (const auto& [derivative, method] :
