@@ -313,6 +313,8 @@ struct PredictiveRun {
   double joint_error = 0.0;
   std::string failure;        // of the first plan that failed: where and why
   bool left_maximum = false;  // in any plan
+  // The first contact in a plan by fixed steps through which its derivatives are not the motion's.
+  std::string discrete_map;
   std::string error;
 };
 
@@ -364,6 +366,10 @@ PredictiveRun Control(const ControlFile& file, const ControlRunOptions& wanted, 
     run.left_maximum |= controller.last().left_maximum;
     if (controller.last().status == IlqrStatus::kFailed && run.failed++ == 0) {
       run.failure = "in step " + std::to_string(k) + ": " + controller.last().message;
+    }
+    const Plan& plan = controller.last().plan;
+    if (run.discrete_map.empty() && plan.states.rows() > plan.controls.rows()) {
+      run.discrete_map = map->DiscreteMapOf(k, plan.states, plan.controls);
     }
     if (!plant->Step(k, x, u, &next, &run.error)) return run;
     run.cost += cost.Value(x, u);
@@ -441,7 +447,10 @@ std::string RunPredictive(const std::string& name, const ControlFile& file, cons
   }
   if (made.left_maximum) run->warnings.push_back(WarningOfMaximum());
   const Certificate certificate = CertifyPlayed(file, made.controls);
-  WarnOfDiscreteMap(certificate, &run->warnings);
+  // A plan looks ahead to impacts that the run which is played may never come to.
+  Certificate of_plans = certificate;
+  if (of_plans.discrete_map.empty()) of_plans.discrete_map = made.discrete_map;
+  WarnOfDiscreteMap(of_plans, &run->warnings);
   run->result = {{"status", "done"},
                  {"cost", made.cost},
                  {"final_state", FinalState(of_plant, made.states)},

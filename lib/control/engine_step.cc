@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "tangible/dynamics/model/driven_bodies.h"
+#include "tangible/simulation/certificate/discrete_map.h"
 
 namespace tangible {
 namespace {
@@ -177,6 +178,22 @@ JointState::Outcome EngineStep::ProjectOntoJoints(long k, VectorX<double>* x, do
   *error = joints_.error();
   if (outcome == JointState::Outcome::kProjected) *x = function_.StateOf(state);
   return outcome;
+}
+
+std::string EngineStep::DiscreteMapOf(long first, const RowMatrixXd& states,
+                                      const RowMatrixXd& controls) {
+  const ModelStructure& s = *model_.structure;
+  if (s.settings.stepping != Stepping::kFixed) return "";
+  DiscreteMapWatch watch(model_);
+  VectorX<double> next;
+  std::string error;
+  for (Eigen::Index i = 0; i < controls.rows(); ++i) {
+    const long k = first + i;
+    if (!Advance(k, states.row(i).transpose(), controls.row(i).transpose(), &next, &error)) break;
+    const std::vector<ContactChange>& changes = watch.AddStep(model_, stepper_.record());
+    if (!changes.empty()) return TextOf(s, k, stepper_.record().time, changes.front());
+  }
+  return "";
 }
 
 bool EngineStep::Step(long k, const VectorX<double>& x, const VectorX<double>& u,

@@ -48,6 +48,12 @@ class EngineStep : public StepMap {
   /// `error`: the joints' largest before, m or rad. One that cannot be moved there stays.
   JointState::Outcome ProjectOntoJoints(long k, VectorX<double>* x, double* error);
 
+  /// Fixed steps from step `first` on, a row of `controls` each, from the states at their starts:
+  /// the first contact that is made or broken, or impact with restitution, through which their
+  /// derivatives are not the motion's (certificate/discrete_map.h). Empty where there is none, and
+  /// with event stepping.
+  std::string DiscreteMapOf(long first, const RowMatrixXd& states, const RowMatrixXd& controls);
+
   /// The initial state of the scene.
   VectorX<double> initial() const { return function_.Defaults().state; }
   /// The state of all bodies, including those of prescribed motion.

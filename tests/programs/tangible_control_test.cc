@@ -184,22 +184,24 @@ TEST_F(TangibleControlTest, LabelsASurrogate) {
   EXPECT_EQ(result["iterations"][0]["jacobians"], "surrogate");
 }
 
+// The cart, and beside it a ball that falls from y onto a floor at -5 m and bounces.
+std::string WithBouncingBall(const std::string& stepping, const std::string& y) {
+  std::string text = kCart;
+  text.replace(text.find("],"), 1, R"(,
+    {"name": "ball", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "restitution": 0.5,
+     "position": [9, )" + y + R"(]},
+    {"name": "floor", "static": true, "restitution": 0.5,
+     "shape": {"half_plane": {"normal": [0, 1], "offset": -5}}}])");
+  text.insert(text.rfind("\"dt\""), "\"stepping\": \"" + stepping + "\", ");
+  return text;
+}
+
 // A ball that bounces beside the cart: by fixed steps derivatives are those of the discrete map.
 TEST_F(TangibleControlTest, WarnsOnceOfTheDiscreteMap) {
-  const auto scene = [](const std::string& stepping, const std::string& y) {
-    std::string text = kCart;
-    text.replace(text.find("],"), 1, R"(,
-      {"name": "ball", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "restitution": 0.5,
-       "position": [9, )" + y + R"(]},
-      {"name": "floor", "static": true, "restitution": 0.5,
-       "shape": {"half_plane": {"normal": [0, 1], "offset": -5}}}])");
-    text.insert(text.rfind("\"dt\""), "\"stepping\": \"" + stepping + "\", ");
-    return text;
-  };
   const std::string problem = Problem(kEffort, R"(, "mpc": {"duration": 0.8, "horizon": 0.4})");
   const std::string file = "'" + Write("problem.json", problem) + "'";
   for (const char* flags : {"", " --mpc"}) {
-    Write("cart.json", scene("fixed", "-4"));
+    Write("cart.json", WithBouncingBall("fixed", "-4"));
     const ProgramRun fixed = Run("tangible-control", file + flags);
     ExpectOneLine(fixed, 0, "contact of ball and floor, an impact with restitution");
     EXPECT_NE(fixed.error.find(R"("stepping": "event")"), std::string::npos) << fixed.error;
@@ -207,13 +209,32 @@ TEST_F(TangibleControlTest, WarnsOnceOfTheDiscreteMap) {
     EXPECT_EQ(certificate["verdict"], "of the discrete map: trustworthy") << flags;
     EXPECT_EQ(certificate["discrete_map"], true);
     for (const auto& [stepping, y] : {std::pair("event", "-4"), std::pair("fixed", "9")}) {
-      Write("cart.json", scene(stepping, y));
+      Write("cart.json", WithBouncingBall(stepping, y));
       const ProgramRun none = Run("tangible-control", file + flags);
       EXPECT_EQ(none.exit_status, 0);
       EXPECT_EQ(none.error, "");
       EXPECT_EQ(json::parse(none.out)["certificate"]["discrete_map"], false);
       EXPECT_EQ(json::parse(none.out)["certificate"]["advice"], "");
     }
+  }
+}
+
+// The ball lands at 0.43 s: within the horizon of the first plans, and after the run.
+TEST_F(TangibleControlTest, WarnsOfAnImpactThatOnlyPlansHave) {
+  for (const auto& [stepping, words] :
+       {std::pair("fixed", "contact of ball and floor, an impact with restitution"),
+        std::pair("event", "")}) {
+    Write("cart.json", WithBouncingBall(stepping, "-4"));
+    const std::string problem = Problem(kEffort, R"(, "mpc": {"duration": 0.2, "horizon": 0.4})");
+    const ProgramRun run =
+        Run("tangible-control", "'" + Write("problem.json", problem) + "' --mpc");
+    ASSERT_EQ(run.exit_status, 0) << run.error;
+    if (*words == '\0') {
+      EXPECT_EQ(run.error, "");
+    } else {
+      ExpectOneLine(run, 0, words);
+    }
+    EXPECT_EQ(json::parse(run.out)["certificate"]["discrete_map"], false);
   }
 }
 

@@ -280,8 +280,7 @@ void RolloutCertifier::AddDiscreteMap(const Model<double>& model, long step,
   made_last_.clear();
   if (!discrete_map_) discrete_map_.emplace(model);
   for (const ContactChange& change : discrete_map_->AddStep(model, record)) {
-    const Place place{model.structure.get(), step, record.time, 0, &change.contact, {}};
-    const std::string text = place.Text() + ", " + NameOf(change.kind);
+    const std::string text = TextOf(*model.structure, step, record.time, change);
     if (certificate_.discrete_map.empty()) certificate_.discrete_map = text;
     if (change.kind == ContactChange::Kind::kRestitution && certificate_.discrete_impact.empty()) {
       certificate_.discrete_impact = text;

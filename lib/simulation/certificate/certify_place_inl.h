@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Where in a rollout a certificate's figure was taken. Included by certify*.cc alone.
+// Where in a rollout a certificate's figure was taken. Included by certify*.cc and discrete_map.cc alone.
 
 #include <algorithm>
 #include <cmath>
@@ -33,6 +33,12 @@ inline bool HasPair(const std::vector<ActiveContact>& contacts, const ActiveCont
   });
 }
 
+inline std::string PlaceText(const ModelStructure& structure, long step, double time,
+                             const ActiveContact& contact) {
+  return "step " + std::to_string(step) + ", t = " + Short(time) +
+         " s: " + ContactName(structure, contact);
+}
+
 struct RolloutCertifier::Place {
   const ModelStructure* structure;
   long step;
@@ -41,10 +47,7 @@ struct RolloutCertifier::Place {
   const ActiveContact* active;
   ContactMode mode;
 
-  std::string Text() const {
-    return "step " + std::to_string(step) + ", t = " + Short(time) +
-           " s: " + ContactName(*structure, *active);
-  }
+  std::string Text() const { return PlaceText(*structure, step, time, *active); }
 };
 
 }  // namespace tangible

@@ -29,12 +29,6 @@ Vector2<double> NormalOf(const Model<double>& model, const StepRecord& record, s
   return {row[0], row[1]};
 }
 
-bool IsBefore(const ActiveContact& x, const ActiveContact& y) {
-  return std::pair(x.a, x.b) < std::pair(y.a, y.b);
-}
-
-}  // namespace
-
 const char* NameOf(ContactChange::Kind kind) {
   switch (kind) {
     case ContactChange::Kind::kMade:
@@ -45,6 +39,17 @@ const char* NameOf(ContactChange::Kind kind) {
       return "an impact with restitution";
   }
   return "";
+}
+
+bool IsBefore(const ActiveContact& x, const ActiveContact& y) {
+  return std::pair(x.a, x.b) < std::pair(y.a, y.b);
+}
+
+}  // namespace
+
+std::string TextOf(const ModelStructure& structure, long step, double time,
+                   const ContactChange& change) {
+  return PlaceText(structure, step, time, change.contact) + ", " + NameOf(change.kind);
 }
 
 DiscreteMapWatch::Touch* DiscreteMapWatch::FindLast(const ActiveContact& contact) {

@@ -16,6 +16,7 @@
 // broken, nor where a body passes from one flush face to another of the same normal, which are one
 // surface; and a slip that ends changes no contact.
 
+#include <string>
 #include <vector>
 
 #include "tangible/dynamics/model/lengths.h"
@@ -29,8 +30,9 @@ struct ContactChange {
   ActiveContact contact;
 };
 
-/// "made", "broken", "an impact with restitution".
-const char* NameOf(ContactChange::Kind kind);
+/// Where it happened, and what: "made", "broken" or "an impact with restitution".
+std::string TextOf(const ModelStructure& structure, long step, double time,
+                   const ContactChange& change);
 
 /// Looks at fixed steps one after another.
 class DiscreteMapWatch {
