@@ -48,8 +48,8 @@ BlockSystem::BlockSystem(const BlockLayout& layout, const std::vector<RowMatrixX
     block.shared =
         blocks[b].rightCols(layout.num_shared()) * scale_.head(layout.num_shared()).asDiagonal();
     if (block.own.size() > 0) {
-      block.qr.setThreshold(kJacobianRank);
-      block.qr.compute(block.own);
+      block.qr.SetThreshold(kJacobianRank);
+      block.qr.Compute(block.own);
       block.rank = block.qr.rank();
     }
   }
@@ -59,7 +59,7 @@ Eigen::MatrixXd BlockSystem::Complement(const Block& block, const Eigen::MatrixX
   if (block.rank == 0) {
     return x;
   }
-  const Eigen::MatrixXd turned = block.qr.householderQ().adjoint() * x;
+  const Eigen::MatrixXd turned = block.qr.AdjointQTimes(x);
   return turned.bottomRows(x.rows() - block.rank);
 }
 
@@ -73,7 +73,7 @@ void BlockSystem::SolveOwn(const Eigen::VectorXd& y, const std::vector<Eigen::Ve
     const Block& block = blocks_[b];
     if (block.rank > 0) {
       const Eigen::VectorXd right = block.shared * y + c[b];
-      scaled->segment(layout_.own_offset(b), layout_.num_own(b)) = -block.qr.solve(right);
+      scaled->segment(layout_.own_offset(b), layout_.num_own(b)) = -block.qr.Solve(right);
     }
   }
 }
@@ -89,10 +89,10 @@ Eigen::VectorXd BlockSystem::LeastSquares(const std::vector<Eigen::VectorXd>& c)
   Eigen::VectorXd scaled = Eigen::VectorXd::Zero(layout_.num_parameters());
   const Eigen::MatrixXd stacked = Stack(parts, num_shared + 1);
   if (num_shared > 0 && stacked.rows() > 0) {
-    Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> qr;
-    qr.setThreshold(kJacobianRank);
-    qr.compute(stacked.leftCols(num_shared));
-    scaled.head(num_shared) = -qr.solve(stacked.col(num_shared));
+    OrthogonalDecomposition qr;
+    qr.SetThreshold(kJacobianRank);
+    qr.Compute(stacked.leftCols(num_shared));
+    scaled.head(num_shared) = -qr.Solve(Eigen::VectorXd(stacked.col(num_shared)));
   }
   SolveOwn(scaled.head(num_shared), c, &scaled);
   return Unscaled(scaled);
@@ -109,7 +109,7 @@ Eigen::VectorXd BlockSystem::Newton(const Eigen::VectorXd& gradient) const {
     a.emplace_back(Eigen::VectorXd::Zero(block.shared.rows()));
     if (block.rank > 0) {
       const Eigen::VectorXd own = g.segment(layout_.own_offset(b), layout_.num_own(b));
-      a.back() = block.qr.pseudoInverse().transpose() * own;
+      a.back() = block.qr.PseudoInverse().transpose() * own;
     }
     shared_gradient -= block.shared.transpose() * a.back();
     parts.push_back(Complement(block, block.shared));

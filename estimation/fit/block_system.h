@@ -21,10 +21,10 @@
 // With a_b = (A_bᵀ)⁺ g_b in the place of c_b it is (1) with the gradient g_s − Σ B_bᵀ a_b of y.
 
 #include <Eigen/Core>
-#include <Eigen/QR>
 #include <vector>
 
 #include "tangible/estimation/problem/least_squares.h"
+#include "tangible/math/decompositions.h"
 
 namespace tangible {
 
@@ -45,8 +45,8 @@ class BlockSystem {
 
  private:
   struct Block {
-    Eigen::MatrixXd own, shared;                                 ///< A and B in scaled columns
-    Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> qr;  ///< of A
+    Eigen::MatrixXd own, shared;  ///< A and B in scaled columns
+    OrthogonalDecomposition qr;   ///< of A
     Eigen::Index rank = 0;
   };
   /// The rows of (1 − P) x, in an orthonormal basis.

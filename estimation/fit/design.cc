@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/estimation/fit/design.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -11,6 +10,7 @@
 #include "tangible/estimation/fit/tolerances.h"
 #include "tangible/estimation/problem/problem_with_priors.h"
 #include "tangible/estimation/uncertainty/tolerances.h"
+#include "tangible/math/decompositions.h"
 #include "tangible/scene/set_parameters.h"
 
 namespace tangible {
@@ -190,13 +190,11 @@ class Informer {
     const MatrixXd inner = all(drop, drop);
     const VectorXd size =
         inner.diagonal().cwiseSqrt().unaryExpr([](double x) { return x > 0.0 ? 1.0 / x : 0.0; });
-    const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(size.asDiagonal() * inner *
-                                                         size.asDiagonal());
-    const MatrixXd cross =
-        solver.eigenvectors().transpose() * (size.asDiagonal() * all(drop, keep));
+    const SymmetricEigen solver(size.asDiagonal() * inner * size.asDiagonal());
+    const MatrixXd cross = solver.vectors().transpose() * (size.asDiagonal() * all(drop, keep));
     for (Eigen::Index i = 0; i < cross.rows(); ++i) {
-      const double value = solver.eigenvalues()[i];
-      if (value <= kDesignRank * solver.eigenvalues().maxCoeff()) continue;
+      const double value = solver.values()[i];
+      if (value <= kDesignRank * solver.values().maxCoeff()) continue;
       kept -= cross.row(i).transpose() * cross.row(i) / value;
     }
     return 0.5 * (kept + kept.transpose());
@@ -217,16 +215,15 @@ Spread SpreadOf(const MatrixXd& information) {
   const VectorXd size = information.diagonal().cwiseMax(0.0).cwiseSqrt();
   const VectorXd inverse = size.unaryExpr([](double x) { return x > 0.0 ? 1.0 / x : 0.0; });
   if (n == 0 || !(size.maxCoeff() > 0.0)) return spread;
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(inverse.asDiagonal() * information *
-                                                       inverse.asDiagonal());
+  const SymmetricEigen solver(inverse.asDiagonal() * information * inverse.asDiagonal());
   VectorXd variance = VectorXd::Zero(n);
   std::vector<bool> determined(static_cast<size_t>(n), true);
   double log_determinant = 0.0;
   bool all = true;
   for (Eigen::Index i = 0; i < n; ++i) {
-    const double value = solver.eigenvalues()[i];
-    const VectorXd direction = solver.eigenvectors().col(i);
-    if (value > kDesignRank * solver.eigenvalues().maxCoeff()) {
+    const double value = solver.values()[i];
+    const VectorXd direction = solver.vectors().col(i);
+    if (value > kDesignRank * solver.values().maxCoeff()) {
       variance += direction.cwiseAbs2() / value;
       log_determinant += std::log(value);
       continue;

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/estimation/fit/linearisation.h"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <utility>
 
 #include "tangible/lcp/contact/worker_pool.h"
+#include "tangible/math/decompositions.h"
 
 namespace tangible {
 namespace {
@@ -44,8 +44,7 @@ class FactorGatherer {
  private:
   void Compress() {
     const Eigen::Index rows = std::min(num_rows_, stacked_.cols());
-    const Eigen::HouseholderQR<Eigen::MatrixXd> qr(stacked_.topRows(num_rows_));
-    stacked_.topRows(rows) = qr.matrixQR().topRows(rows).triangularView<Eigen::Upper>();
+    stacked_.topRows(rows) = UnpivotedQr(stacked_.topRows(num_rows_)).UpperFactor();
     num_rows_ = rows;
   }
 

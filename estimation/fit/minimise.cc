@@ -11,6 +11,7 @@
 #include "tangible/estimation/fit/block_system.h"
 #include "tangible/estimation/fit/linearisation.h"
 #include "tangible/estimation/fit/tolerances.h"
+#include "tangible/math/decompositions.h"
 #include "tangible/math/median.h"
 #include "tangible/math/scalar.h"
 
@@ -185,7 +186,7 @@ class Acceleration {
       moved.col(i) = points_[i + 1] - points_[i];
       changed.col(i) = steps_[i + 1] - steps_[i];
     }
-    const Eigen::VectorXd share = changed.colPivHouseholderQr().solve(step);
+    const Eigen::VectorXd share = PivotedQr(changed).Solve(step);
     return q + step - (moved + changed) * share;
   }
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/estimation/fit/missing.h"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <chrono>
 #include <map>
@@ -14,6 +13,7 @@
 #include "tangible/estimation/problem/problem_with_priors.h"
 #include "tangible/estimation/uncertainty/score_rows.h"
 #include "tangible/estimation/uncertainty/tolerances.h"
+#include "tangible/math/decompositions.h"
 #include "tangible/render/html.h"
 
 namespace tangible {
@@ -185,9 +185,9 @@ class MissingSearch {
       lengths[k] = length > kSeparable * columns.col(k).norm() ? length : HUGE_VAL;
       unit.col(k) /= lengths[k];
     }
-    const Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver(unit);
+    const OrthogonalDecomposition solver(unit);
     if (solver.rank() == 0 || unit.norm() == 0.0) return false;
-    const Eigen::VectorXd steps = -solver.solve(score_.residuals());
+    const Eigen::VectorXd steps = -solver.Solve(score_.residuals());
     explained->part = -unit * steps;
     explained->share = explained->part.squaredNorm() / score_.square();
     explained->held = InitialOf(entries);

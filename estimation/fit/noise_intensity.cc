@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/estimation/fit/noise_intensity.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/LU>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <tuple>
@@ -13,6 +10,7 @@
 #include "tangible/estimation/fit/tolerances.h"
 #include "tangible/estimation/problem/problem_with_priors.h"
 #include "tangible/estimation/uncertainty/tolerances.h"
+#include "tangible/math/decompositions.h"
 #include "tangible/simulation/gradient/gradient.h"
 
 namespace tangible {
@@ -175,17 +173,17 @@ double NoiseLikelihood::Eliminate(const Eigen::MatrixXd& stacked, Whole* whole) 
   const Eigen::VectorXd lengths = stacked.leftCols(num_free_).colwise().norm().transpose();
   const Eigen::VectorXd scale = (lengths.array() > 0.0).select(lengths, 1.0).cwiseInverse();
   const Eigen::MatrixXd scaled = stacked.leftCols(num_free_) * scale.asDiagonal();
-  Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> factor;
-  factor.setThreshold(kJacobianRank);
-  factor.compute(scaled);
-  const Eigen::VectorXd scaled_step = -factor.solve(stacked.col(num_free_));
+  OrthogonalDecomposition factor;
+  factor.SetThreshold(kJacobianRank);
+  factor.Compute(scaled);
+  const Eigen::VectorXd scaled_step = -factor.Solve(Eigen::VectorXd(stacked.col(num_free_)));
   const Eigen::VectorXd step = scale.cwiseProduct(scaled_step);
   sum += 0.5 * (scaled * scaled_step + stacked.col(num_free_)).squaredNorm();
   for (Eigen::Index i = 0; i < factor.rank(); ++i) {
-    sum += std::log(std::abs(factor.matrixT()(i, i)));
+    sum += std::log(std::abs(factor.triangle()(i, i)));
   }
   sum -= scale.array().log().sum();
-  const Eigen::MatrixXd inverse = scale.asDiagonal() * factor.pseudoInverse();
+  const Eigen::MatrixXd inverse = scale.asDiagonal() * factor.PseudoInverse();
   const Eigen::MatrixXd covariance = inverse * inverse.transpose();
   for (const std::vector<int>& columns : columns_) {
     const auto size = static_cast<Eigen::Index>(columns.size());
@@ -302,10 +300,10 @@ class IntensitySearch {
     const auto size = static_cast<Eigen::Index>(free_.size());
     const Eigen::VectorXd score = Score(log_);
     if (!keeps_curvature_) Differentiate(score);
-    const Eigen::LLT<Eigen::MatrixXd> factor(curvature_);
-    const bool convex = factor.info() == Eigen::Success;
+    const Cholesky factor(curvature_);
+    const bool convex = factor.succeeded();
     Eigen::VectorXd step(size);
-    if (convex) step = -factor.solve(score);
+    if (convex) step = -factor.Solve(score);
     // Else towards E[ε²] = 1, as the expectation-maximisation goes, but faster.
     if (!convex) step = -score;
     const double longest = step.cwiseAbs().maxCoeff();
@@ -314,7 +312,9 @@ class IntensitySearch {
     keeps_curvature_ = convex && longest < kChordStep;
     deviations_ = Eigen::VectorXd::Constant(size, HUGE_VAL);
     if (convex) {
-      deviations_ = factor.solve(Eigen::MatrixXd::Identity(size, size)).diagonal().cwiseSqrt();
+      deviations_ = factor.Solve(Eigen::MatrixXd(Eigen::MatrixXd::Identity(size, size)))
+                        .diagonal()
+                        .cwiseSqrt();
     }
     double moved = 0.0;
     for (Eigen::Index j = 0; j < size; ++j) {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/estimation/fit/observed_state.h"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -15,6 +14,7 @@
 #include "tangible/dynamics/model/state_variable.h"
 #include "tangible/estimation/fit/minimise.h"
 #include "tangible/estimation/fit/tolerances.h"
+#include "tangible/math/decompositions.h"
 #include "tangible/simulation/gradient/gradient.h"
 #include "tangible/simulation/stepping/invariants.h"
 
@@ -53,9 +53,9 @@ SmoothedSeries FitParabola(const std::vector<SeriesSample>& samples, size_t coun
     }
     values[i] = sample.value / sample.sigma;
   }
-  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(terms);
-  const Eigen::VectorXd found = qr.solve(values);
-  const Eigen::MatrixXd r = qr.matrixQR().topRows(terms.cols()).triangularView<Eigen::Upper>();
+  const UnpivotedQr qr(terms);
+  const Eigen::VectorXd found = qr.Solve(values);
+  const Eigen::MatrixXd r = qr.UpperFactor();
   const Eigen::MatrixXd inverse =
       r.triangularView<Eigen::Upper>().solve(Eigen::MatrixXd::Identity(r.rows(), r.cols()));
   const double squares = (values - terms * found).squaredNorm();

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/estimation/fit/posterior.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -13,6 +12,7 @@
 #include "tangible/estimation/uncertainty/nuts.h"
 #include "tangible/estimation/uncertainty/tolerances.h"
 #include "tangible/lcp/contact/worker_pool.h"
+#include "tangible/math/decompositions.h"
 #include "tangible/render/html.h"
 
 namespace tangible {
@@ -187,9 +187,9 @@ Eigen::MatrixXd FactorOf(const std::vector<FreeCoordinate::Value>& values,
   for (double ridge = kLeastInformation;; ridge *= 100.0) {
     Eigen::MatrixXd reversed = scaled.reverse();
     reversed.diagonal().array() += ridge;
-    const Eigen::LLT<Eigen::MatrixXd> cholesky(reversed);
-    if (cholesky.info() != Eigen::Success) continue;
-    const Eigen::MatrixXd inverse = cholesky.matrixU().solve(Eigen::MatrixXd::Identity(n, n));
+    const Cholesky cholesky(reversed);
+    if (!cholesky.succeeded()) continue;
+    const Eigen::MatrixXd inverse = cholesky.SolveUpper(Eigen::MatrixXd::Identity(n, n));
     return lengths.cwiseInverse().asDiagonal() * Eigen::MatrixXd(inverse.reverse());
   }
 }

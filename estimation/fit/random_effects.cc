@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/estimation/fit/random_effects.h"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
 #include <boost/math/tools/minima.hpp>
@@ -11,6 +10,7 @@
 
 #include "tangible/estimation/fit/tolerances.h"
 #include "tangible/estimation/problem/problem_with_priors.h"
+#include "tangible/math/decompositions.h"
 #include "tangible/math/median.h"
 
 namespace tangible {
@@ -80,13 +80,10 @@ SpreadLikelihood::Normal SpreadLikelihood::Eliminate(int block,
     rows(row, own + shared) = residual.residual;
   }
   const Eigen::VectorXd lengths = rows.colwise().norm();
-  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(rows);
-  const Eigen::Index kept = std::min(rows.rows(), rows.cols());
-  const Eigen::MatrixXd factor =
-      qr.matrixQR().topRows(kept).triangularView<Eigen::Upper>().toDenseMatrix();
+  const Eigen::MatrixXd factor = UnpivotedQr(rows).UpperFactor();
   Normal normal;
   normal.log_determinant = LogDiagonal(factor, lengths, own);
-  const Eigen::Index left = std::max<Eigen::Index>(0, kept - own);
+  const Eigen::Index left = std::max<Eigen::Index>(0, factor.rows() - own);
   normal.reduced = factor.bottomRightCorner(left, shared + 1);
   return normal;
 }
@@ -110,10 +107,10 @@ SpreadLikelihood::Value SpreadLikelihood::At(const std::vector<double>& spreads)
     first += part.rows();
   }
   const Eigen::VectorXd lengths = stacked.colwise().norm();
-  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(stacked);
-  value.likelihood -= LogDiagonal(qr.matrixQR(), lengths, shared);
+  const Eigen::MatrixXd factor = UnpivotedQr(stacked).UpperFactor();
+  value.likelihood -= LogDiagonal(factor, lengths, shared);
   if (count > shared) {
-    value.twice_cost = qr.matrixQR()(shared, shared) * qr.matrixQR()(shared, shared);
+    value.twice_cost = factor(shared, shared) * factor(shared, shared);
   }
   for (size_t e = 0; e < effects_.size(); ++e) {
     const auto& own = effects_[e].own;
@@ -136,9 +133,9 @@ std::pair<double, double> SpreadLikelihood::RangeOf(int effect) const {
     RowMatrixXd own = blocks_[block].factor.leftCols(layout_.num_own(b));
     const Eigen::Index column = k - layout_.own_offset(b);
     own.col(column).swap(own.col(own.cols() - 1));
-    const Eigen::HouseholderQR<Eigen::MatrixXd> qr(own);
+    const Eigen::MatrixXd factor = UnpivotedQr(own).UpperFactor();
     const Eigen::Index last = own.cols() - 1;
-    const double left = own.rows() > last ? std::abs(qr.matrixQR()(last, last)) : 0.0;
+    const double left = own.rows() > last ? std::abs(factor(last, last)) : 0.0;
     if (left > kUndeterminedColumn * own.norm()) {
       const double size = of.kind == PriorKind::kLogNormal ? std::abs(estimate_[k]) : 1.0;
       deviations.push_back(1.0 / (left * size));

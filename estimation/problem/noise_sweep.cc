@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/estimation/problem/noise_sweep.h"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+
+#include "tangible/math/decompositions.h"
 
 namespace tangible {
 namespace {
@@ -55,11 +56,8 @@ void Assemble(const Sizes& s, const NoiseInterval& interval, const Eigen::Matrix
 /// Makes the rows upper triangular; those that have nothing but the last column become one number,
 /// whose square is returned.
 double Triangularise(Eigen::MatrixXd* rows) {
-  Eigen::HouseholderQR<Eigen::Ref<Eigen::MatrixXd>> qr(*rows);
+  MakeUpperTriangular(rows);
   const Eigen::Index kept = std::min(rows->rows(), rows->cols() - 1);
-  for (Eigen::Index j = 0; j < rows->cols(); ++j) {
-    rows->col(j).tail(std::max<Eigen::Index>(0, rows->rows() - j - 1)).setZero();
-  }
   const double rest = rows->rows() > kept ? (*rows)(kept, rows->cols() - 1) : 0.0;
   rows->conservativeResize(kept, Eigen::NoChange);
   return rest * rest;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/estimation/results/report_motion.h"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -10,6 +9,7 @@
 #include <vector>
 
 #include "tangible/estimation/results/residual_summary.h"
+#include "tangible/math/decompositions.h"
 #include "tangible/render/recorder/view_recorder.h"
 
 namespace tangible {
@@ -104,8 +104,8 @@ class MarkKeeper {
       any = true;
     }
     if (!any) return false;
-    const Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver(by_place);
-    mark.observed = mark.fitted - Vector2<double>(solver.solve(differences));
+    const OrthogonalDecomposition solver(by_place);
+    mark.observed = mark.fitted - Vector2<double>(solver.Solve(differences));
     marks_[place] = mark;
     return true;
   }

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/estimation/uncertainty/decomposition.h"
 
-#include <Eigen/QR>
 #include <Eigen/SVD>
 #include <algorithm>
 #include <limits>
+
+#include "tangible/math/decompositions.h"
 
 namespace tangible {
 namespace {
@@ -20,9 +21,7 @@ Eigen::MatrixXd TriangularFactor(const RowMatrixXd& a, const Eigen::VectorXd& sc
     Eigen::MatrixXd stacked(r.rows() + count, columns);
     stacked.topRows(r.rows()) = r;
     stacked.bottomRows(count) = a.middleRows(first, count) * scale.asDiagonal();
-    const Eigen::HouseholderQR<Eigen::MatrixXd> qr(stacked);
-    const Eigen::Index rows = std::min(stacked.rows(), columns);
-    r = qr.matrixQR().topRows(rows).triangularView<Eigen::Upper>();
+    r = UnpivotedQr(stacked).UpperFactor();
   }
   return r;
 }
@@ -72,10 +71,10 @@ Eigen::MatrixXd PseudoSolve(const RowMatrixXd& a, const RowMatrixXd& b, double t
   for (double& x : length) {
     x = x > 0.0 ? x : 1.0;
   }
-  Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> qr;
-  qr.setThreshold(tolerance);
-  qr.compute(a * length.cwiseInverse().asDiagonal());
-  return length.cwiseInverse().asDiagonal() * qr.solve(Eigen::MatrixXd(b));
+  OrthogonalDecomposition qr;
+  qr.SetThreshold(tolerance);
+  qr.Compute(a * length.cwiseInverse().asDiagonal());
+  return length.cwiseInverse().asDiagonal() * qr.Solve(Eigen::MatrixXd(b));
 }
 
 }  // namespace tangible

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/estimation/uncertainty/nuts.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -9,6 +8,7 @@
 #include <vector>
 
 #include "tangible/estimation/uncertainty/tolerances.h"
+#include "tangible/math/decompositions.h"
 
 namespace tangible {
 namespace {
@@ -228,9 +228,9 @@ class Sampler {
     Eigen::MatrixXd covariance = z * z.transpose();
     covariance.diagonal().array() += before;
     covariance /= static_cast<double>(n - 1) + before;
-    const Eigen::LLT<Eigen::MatrixXd> cholesky(covariance);
-    if (cholesky.info() != Eigen::Success) return;
-    factor_ = (factor_.triangularView<Eigen::Lower>() * Eigen::MatrixXd(cholesky.matrixL())).eval();
+    const Cholesky cholesky(covariance);
+    if (!cholesky.succeeded()) return;
+    factor_ = (factor_.triangularView<Eigen::Lower>() * cholesky.Lower()).eval();
   }
 
   /// False where the caller ends it.

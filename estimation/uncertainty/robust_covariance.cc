@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/estimation/uncertainty/robust_covariance.h"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
@@ -11,6 +10,7 @@
 
 #include "tangible/estimation/uncertainty/decomposition.h"
 #include "tangible/estimation/uncertainty/tolerances.h"
+#include "tangible/math/decompositions.h"
 #include "tangible/math/median.h"
 #include "tangible/math/scalar.h"
 
@@ -260,13 +260,13 @@ bool Jackknife(const std::vector<Reduced>& reduced, const std::vector<RecordingR
       left.col(k) *= scale;
       score[k] *= scale;
     }
-    Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr;
-    qr.setThreshold(std::max(options.rank_tolerance, kJackknifeRank));
-    qr.compute(left);
+    PivotedQr qr;
+    qr.SetThreshold(std::max(options.rank_tolerance, kJackknifeRank));
+    qr.Compute(left);
     if (qr.rank() < size) {
       return false;
     }
-    Eigen::VectorXd moved = qr.solve(score);
+    Eigen::VectorXd moved = qr.Solve(score);
     for (Eigen::Index k = 0; k < size; ++k) {
       moved[k] *= length[k] > 0.0 ? 1.0 / length[k] : 1.0;
     }

@@ -8,25 +8,24 @@ namespace tangible {
 namespace {
 
 /// The part of v that is orthogonal to the columns of `qr`.
-template <typename Matrix>
-Matrix Project(const Eigen::ColPivHouseholderQR<Eigen::MatrixXd>& qr, const Matrix& v) {
+Eigen::MatrixXd Project(const PivotedQr& qr, const Eigen::MatrixXd& v) {
   if (qr.cols() == 0 || qr.rank() == 0) {
     return v;
   }
-  Eigen::MatrixXd rotated = qr.householderQ().adjoint() * v;
+  Eigen::MatrixXd rotated = qr.AdjointQTimes(v);
   rotated.topRows(qr.rank()).setZero();
-  return qr.householderQ() * rotated;
+  return qr.QTimes(rotated);
 }
 
-Eigen::ColPivHouseholderQR<Eigen::MatrixXd> Decompose(const Eigen::MatrixXd& columns) {
+PivotedQr Decompose(const Eigen::MatrixXd& columns) {
   Eigen::MatrixXd unit = columns;
   for (Eigen::Index k = 0; k < unit.cols(); ++k) {
     const double length = unit.col(k).norm();
     unit.col(k) /= length > 0.0 ? length : 1.0;
   }
-  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr;
+  PivotedQr qr;
   if (unit.size() > 0) {
-    qr.compute(unit);
+    qr.Compute(unit);
   }
   return qr;
 }
@@ -62,7 +61,7 @@ bool ScoreRows::Evaluate() {
     if (!AddBlock(block)) return false;
   }
   shared_ = Decompose(free_columns_);
-  residuals_ = Project<Eigen::MatrixXd>(shared_, residuals_);
+  residuals_ = Project(shared_, residuals_);
   free_columns_.resize(0, 0);
   return true;
 }
@@ -93,9 +92,9 @@ bool ScoreRows::AddBlock(int block) {
   const auto& qr = own_.emplace_back(Decompose(scaled(evaluation.jacobian(Eigen::all, own))));
   const Eigen::MatrixXd residuals = scaled(evaluation.residuals);
   square_ += residuals.squaredNorm();
-  residuals_.segment(first, count) = Project<Eigen::MatrixXd>(qr, residuals);
+  residuals_.segment(first, count) = Project(qr, residuals);
   free_columns_.middleRows(first, count) =
-      Project<Eigen::MatrixXd>(qr, scaled(evaluation.jacobian(Eigen::all, free_)));
+      Project(qr, scaled(evaluation.jacobian(Eigen::all, free_)));
   for (size_t i = 0; i < bound_.size(); ++i) {
     for (int local = 0; local < layout_.num_local(block); ++local) {
       if (layout_.ParameterOf(block, local) == bound_[i]) {
@@ -112,11 +111,11 @@ RowMatrixXd ScoreRows::WithoutOwn(int block, const RowMatrixXd& columns) const {
   const Eigen::VectorXd& weights = weights_[static_cast<size_t>(block)];
   RowMatrixXd all = RowMatrixXd::Zero(weights.size(), columns.cols());
   all.topRows(columns.rows()) = weights.head(columns.rows()).asDiagonal() * columns;
-  return Project<Eigen::MatrixXd>(own_[static_cast<size_t>(block)], all);
+  return Project(own_[static_cast<size_t>(block)], all);
 }
 
 RowMatrixXd ScoreRows::WithoutShared(const RowMatrixXd& columns) const {
-  return Project<Eigen::MatrixXd>(shared_, columns);
+  return Project(shared_, columns);
 }
 
 }  // namespace tangible

@@ -10,11 +10,11 @@
 // Parameters at a bound are not free.
 
 #include <Eigen/Core>
-#include <Eigen/QR>
 #include <functional>
 #include <vector>
 
 #include "tangible/estimation/problem/least_squares.h"
+#include "tangible/math/decompositions.h"
 
 namespace tangible {
 
@@ -53,10 +53,10 @@ class ScoreRows {
   LeastSquaresProblem* problem_;
   std::function<double(double)> root_weight_;
   BlockLayout layout_;
-  std::vector<int> free_, bound_;                                 ///< free_: of the shared ones
-  std::vector<Eigen::ColPivHouseholderQR<Eigen::MatrixXd>> own_;  ///< of each block
-  std::vector<Eigen::VectorXd> weights_;                          ///< of the rows of each block
-  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> shared_;
+  std::vector<int> free_, bound_;         ///< free_: of the shared ones
+  std::vector<PivotedQr> own_;            ///< of each block
+  std::vector<Eigen::VectorXd> weights_;  ///< of the rows of each block
+  PivotedQr shared_;
   Eigen::VectorXd residuals_;
   RowMatrixXd free_columns_, bound_columns_;
   double square_ = 0.0;

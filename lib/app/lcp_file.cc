@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/app/lcp_file.h"
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
 #include "tangible/app/program.h"
 #include "tangible/app/tolerances.h"
+#include "tangible/math/decompositions.h"
 
 namespace tangible {
 namespace {
@@ -121,17 +120,16 @@ class ProblemReader {
       for (Index i = 0; i < A.rows(); ++i) {
         A.row(i).normalize();  // a row of zeros remains
       }
-      const Eigen::ColPivHouseholderQR<MatrixXd> qr(A.transpose());
-      const MatrixXd q = qr.householderQ();
-      basis = q.rightCols(n - qr.rank());
+      const PivotedQr qr(A.transpose());
+      basis = qr.Q().rightCols(n - qr.rank());
     }
     if (basis.cols() == 0) return;
     basis = scale.asDiagonal() * basis;
-    const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(basis.transpose() * problem.M * basis);
+    const SymmetricEigen eigen(basis.transpose() * problem.M * basis);
     const double rounding =
-        kDefiniteRounding * static_cast<double>(n) * eigen.eigenvalues().cwiseAbs().maxCoeff();
-    if (eigen.eigenvalues()[0] > rounding) return;
-    const VectorXd v = (basis * eigen.eigenvectors().col(0)).normalized();
+        kDefiniteRounding * static_cast<double>(n) * eigen.values().cwiseAbs().maxCoeff();
+    if (eigen.values()[0] > rounding) return;
+    const VectorXd v = (basis * eigen.vectors().col(0)).normalized();
     root_.At("M").Fail("expected a matrix that is positive definite where A v = 0, got v' M v = " +
                        FormatNumber(v.dot(problem.M * v)) + " for a unit v");
   }

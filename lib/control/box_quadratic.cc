@@ -36,7 +36,7 @@ class Search {
       return false;
     }
     VectorX<double> direction = VectorX<double>::Zero(x.size());
-    direction(solution->free) = -solution->factor.solve(VectorX<double>(gradient(solution->free)));
+    direction(solution->free) = -solution->factor.Solve(VectorX<double>(gradient(solution->free)));
     if (!Move(gradient, direction, &solution->x)) {
       // The remaining gradient is rounding.
       solution->status = BoxQuadraticStatus::kSolved;
@@ -57,8 +57,8 @@ class Search {
   }
 
   bool Factor(BoxQuadraticSolution* solution) const {
-    solution->factor.compute(h_(solution->free, solution->free));
-    if (!solution->free.empty() && solution->factor.info() != Eigen::Success) {
+    solution->factor.Compute(h_(solution->free, solution->free));
+    if (!solution->free.empty() && !solution->factor.succeeded()) {
       solution->status = BoxQuadraticStatus::kIndefinite;
       return false;
     }

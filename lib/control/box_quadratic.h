@@ -10,9 +10,9 @@
 // projection onto the box. From a good start the set of variables at bounds is found in a few
 // steps.
 
-#include <Eigen/Cholesky>
 #include <vector>
 
+#include "tangible/math/decompositions.h"
 #include "tangible/math/scalar.h"
 
 namespace tangible {
@@ -23,8 +23,8 @@ struct BoxQuadraticSolution {
   /// kIndefinite: H is not positive definite in the variables that are free.
   BoxQuadraticStatus status = BoxQuadraticStatus::kIterationLimit;
   VectorX<double> x;
-  std::vector<int> free;                 ///< variables not at a bound, ascending
-  Eigen::LLT<MatrixX<double>> factor{};  ///< of H over them
+  std::vector<int> free;  ///< variables not at a bound, ascending
+  Cholesky factor{};      ///< of H over them
   int iterations = 0;
 };
 

@@ -262,7 +262,7 @@ class Solver {
       MatrixX<double> gain = MatrixX<double>::Zero(m_, n_);
       if (!box.free.empty()) {
         gain(box.free, Eigen::all) =
-            -box.factor.solve(MatrixX<double>(shifted_ux(box.free, Eigen::all)));
+            -box.factor.Solve(MatrixX<double>(shifted_ux(box.free, Eigen::all)));
       }
       linear_ += box.x.dot(q_u);
       quadratic_ += 0.5 * box.x.dot(q_uu * box.x);

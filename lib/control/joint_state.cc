@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/control/joint_state.h"
 
-#include <Eigen/QR>
-
 #include "tangible/control/tolerances.h"
 #include "tangible/dynamics/elements/joint.h"
+#include "tangible/math/decompositions.h"
 #include "tangible/math/scalar.h"
 
 namespace tangible {
@@ -61,7 +60,7 @@ void JointState::ProjectTwists(State<double>* state) const {
       }
     }
   }
-  const VectorX<double> change = rows.completeOrthogonalDecomposition().solve(-rates);
+  const VectorX<double> change = OrthogonalDecomposition(rows).Solve(VectorX<double>(-rates));
   for (const int body : s.moving) {
     const int block = s.bodies[body].block;
     for (int i = 0; i < 3; ++i) {

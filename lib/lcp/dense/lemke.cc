@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/lcp/dense/lemke.h"
 
-#include <Eigen/LU>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
 #include "tangible/lcp/dense/scaling.h"
 #include "tangible/lcp/dense/tolerances.h"
+#include "tangible/math/decompositions.h"
 
 namespace tangible {
 namespace {
@@ -152,12 +151,11 @@ LemkeResult SolveLemkeFrom(const VectorXd& start, const MatrixXd& W, const Vecto
   const Index size = static_cast<Index>(basis.size());
   const MatrixXd square = W(basis, basis);
   const Equilibration scaling = Equilibrate(square);
-  const Eigen::PartialPivLU<MatrixXd> lu(scaling.row.asDiagonal() * square *
-                                         scaling.col.asDiagonal());
+  const PartialLu lu(scaling.row.asDiagonal() * square * scaling.col.asDiagonal());
   const auto solve = [&](const MatrixXd& rhs) -> MatrixXd {
     const auto once = [&](const MatrixXd& of) -> MatrixXd {
       if (of.cols() == 0) return of;  // Eigen's triangular solve would form a null reference
-      return scaling.col.asDiagonal() * lu.solve(scaling.row.asDiagonal() * of);
+      return scaling.col.asDiagonal() * lu.Solve(MatrixXd(scaling.row.asDiagonal() * of));
     };
     const MatrixXd x = once(rhs);
     return x + once(rhs - square * x);
@@ -200,12 +198,12 @@ std::optional<ReducedLcp> ReduceToPlain(const MixedLcp<double>& problem) {
   if (nv + ny > 0) {
     const Equilibration scaling = Equilibrate(K);
     const MatrixXd scaled = scaling.row.asDiagonal() * K * scaling.col.asDiagonal();
-    Eigen::CompleteOrthogonalDecomposition<MatrixXd> decomposition;
-    decomposition.setThreshold(kReducedRank);
-    decomposition.compute(scaled);
+    OrthogonalDecomposition decomposition;
+    decomposition.SetThreshold(kReducedRank);
+    decomposition.Compute(scaled);
     const MatrixXd scaled_rhs = scaling.row.asDiagonal() * rhs;
-    MatrixXd x = decomposition.solve(scaled_rhs);
-    x += decomposition.solve(scaled_rhs - scaled * x);
+    MatrixXd x = decomposition.Solve(scaled_rhs);
+    x += decomposition.Solve(MatrixXd(scaled_rhs - scaled * x));
     const double error = (scaled_rhs - scaled * x).cwiseAbs().maxCoeff();
     if (!(error <= kConsistent * scaled_rhs.cwiseAbs().maxCoeff())) return std::nullopt;
     solution = scaling.col.asDiagonal() * x;

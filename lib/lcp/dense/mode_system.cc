@@ -42,19 +42,19 @@ ModeSystem::ModeSystem(const MixedLcp<double>& problem, const std::vector<RowMod
   scaling_ = Equilibrate(K);
   K_ = scaling_.row.asDiagonal() * K * scaling_.col.asDiagonal();
   if (n == 0) return;
-  lu_.compute(K_);
-  // The estimate of rcond() is meaningless where a pivot is zero or nearly zero.
-  const auto pivots = lu_.matrixLU().diagonal().cwiseAbs();
+  lu_.Compute(K_);
+  // The estimate of the condition is meaningless where a pivot is zero or nearly zero.
+  const auto pivots = lu_.factors().diagonal().cwiseAbs();
   const bool vanishing = !(pivots.minCoeff() > kSingularMatrix * pivots.maxCoeff());
-  const double reciprocal = vanishing ? 0.0 : lu_.rcond();
+  const double reciprocal = vanishing ? 0.0 : lu_.ReciprocalCondition();
   singular_ = !(reciprocal > kSingularMatrix);
   condition_ = 1.0 / reciprocal;
   if (!singular_) return;
-  orthogonal_.setThreshold(kRankTolerance);
-  orthogonal_.compute(K_);
+  orthogonal_.SetThreshold(kRankTolerance);
+  orthogonal_.Compute(K_);
   const Index rank = orthogonal_.rank();
   rank_deficiency_ = static_cast<int>(n - rank);
-  const auto& triangle = orthogonal_.matrixT();
+  const auto& triangle = orthogonal_.triangle();
   condition_ = rank > 0 ? std::abs(triangle(0, 0) / triangle(rank - 1, rank - 1)) : 1.0;
 }
 
@@ -77,7 +77,7 @@ LcpVector ModeSystem::Solve(const LcpVector& r, double* relative_error) const {
   VectorXd x = VectorXd::Zero(rhs.size());
   VectorXd residual = rhs;
   for (int k = 0; k < 3 && rhs.size() > 0; ++k) {
-    x += singular_ ? VectorXd(orthogonal_.solve(residual)) : VectorXd(lu_.solve(residual));
+    x += singular_ ? orthogonal_.Solve(residual) : lu_.Solve(residual);
     residual = rhs - K_ * x;
   }
   StoreError(residual, rhs, relative_error);
@@ -89,8 +89,7 @@ LcpVector ModeSystem::SolveTransposed(const LcpVector& g, double* relative_error
   VectorXd x = VectorXd::Zero(rhs.size());
   VectorXd residual = rhs;
   for (int k = 0; k < 3 && rhs.size() > 0; ++k) {
-    x += singular_ ? VectorXd(orthogonal_.transpose().solve(residual))
-                   : VectorXd(lu_.transpose().solve(residual));
+    x += singular_ ? orthogonal_.SolveTransposed(residual) : lu_.SolveTransposed(residual);
     residual = rhs - K_.transpose() * x;
   }
   StoreError(residual, rhs, relative_error);

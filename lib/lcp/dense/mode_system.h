@@ -14,12 +14,11 @@
 // none. The same factorisation serves the transposed system, so that tangent and adjoint agree to
 // rounding also where the solution is not unique.
 
-#include <Eigen/LU>
-#include <Eigen/QR>
 #include <vector>
 
 #include "tangible/lcp/dense/problem.h"
 #include "tangible/lcp/dense/scaling.h"
+#include "tangible/math/decompositions.h"
 
 namespace tangible {
 
@@ -59,8 +58,8 @@ class ModeSystem {
   std::vector<Eigen::Index> rows_;  // R
   Equilibration scaling_;
   MatrixX<double> K_;  // equilibrated
-  Eigen::PartialPivLU<MatrixX<double>> lu_;
-  Eigen::CompleteOrthogonalDecomposition<MatrixX<double>> orthogonal_;
+  PartialLu lu_;
+  OrthogonalDecomposition orthogonal_;
   int rank_deficiency_ = 0;
   double condition_ = 1.0;
   bool singular_ = false;

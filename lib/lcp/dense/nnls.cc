@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/lcp/dense/nnls.h"
 
-#include <Eigen/QR>
 #include <vector>
 
 #include "tangible/lcp/dense/tolerances.h"
+#include "tangible/math/decompositions.h"
 
 namespace tangible {
 namespace {
@@ -21,7 +21,7 @@ VectorXd SolvePassive(const MatrixXd& E, const VectorXd& f, const std::vector<ch
   }
   VectorXd x = VectorXd::Zero(E.cols());
   if (columns.empty()) return x;
-  const VectorXd solution = E(Eigen::all, columns).colPivHouseholderQr().solve(f);
+  const VectorXd solution = PivotedQr(E(Eigen::all, columns)).Solve(f);
   for (std::size_t k = 0; k < columns.size(); ++k) x[columns[k]] = solution[k];
   return x;
 }

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/lcp/dense/problem.h"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
 #include "tangible/lcp/dense/tolerances.h"
+#include "tangible/math/decompositions.h"
 
 namespace tangible {
 namespace {
@@ -33,9 +33,9 @@ std::string CheckBlock(const char* name, const MatrixXd& block, Index rows, Inde
 VectorXd EffectiveImpulse(const MatrixXd& A, const VectorXd& y) {
   if (y.size() < 2 || A.cols() == 0 || !y.allFinite()) return y;
   const MatrixXd rows = A.transpose();
-  const Eigen::CompleteOrthogonalDecomposition<MatrixXd> decomposition(rows);
+  const OrthogonalDecomposition decomposition(rows);
   if (decomposition.rank() == y.size()) return y;
-  return decomposition.solve(rows * y);
+  return decomposition.Solve(VectorXd(rows * y));
 }
 
 template <typename T>

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/lcp/dense/row_modes.h"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "tangible/lcp/dense/nnls.h"
 #include "tangible/lcp/dense/tolerances.h"
+#include "tangible/math/decompositions.h"
 
 namespace tangible {
 namespace {
@@ -77,11 +77,10 @@ MatrixXd ConeFunctionals(const MixedLcp<double>& problem, const std::vector<Inde
   if (equations.rows() > 0) {
     const MatrixXd scaled = scaling.row.asDiagonal() * equations * scaling.col.asDiagonal();
     // In the QR of the transpose the last columns of Q are orthogonal to all rows.
-    Eigen::ColPivHouseholderQR<MatrixXd> qr;
-    qr.setThreshold(kRankTolerance);
-    qr.compute(scaled.transpose());
-    const MatrixXd q = qr.householderQ();
-    null_space = scaling.col.asDiagonal() * q.rightCols(equations.cols() - qr.rank());
+    PivotedQr qr;
+    qr.SetThreshold(kRankTolerance);
+    qr.Compute(scaled.transpose());
+    null_space = scaling.col.asDiagonal() * qr.Q().rightCols(equations.cols() - qr.rank());
   }
   MatrixXd functionals(2 * nd, null_space.cols());
   functionals.topRows(nd) = null_space.bottomRows(nd);

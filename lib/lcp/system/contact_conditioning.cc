@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/lcp/system/contact_conditioning.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <random>
 #include <utility>
 
 #include "tangible/lcp/system/tolerances.h"
+#include "tangible/math/decompositions.h"
 #include "tangible/math/leased.h"
 
 namespace tangible {
@@ -364,8 +365,8 @@ int RowGroups::RankOf(const Group& group, Side side, std::vector<int>* place) co
       }
     }
   }
-  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(scaled);
-  qr.setThreshold(RankThreshold(side));
+  PivotedQr qr(scaled);
+  qr.SetThreshold(RankThreshold(side));
   return static_cast<int>(qr.rank());
 }
 

@@ -56,15 +56,14 @@ void ImplicitStage::Factor(const Model<double>& model, Segment* segment) {
   VisitJacobian(model, ViewOf(*segment, *node, false), JacobianRoute::kByHand, &scratch_,
                 TangentSink{place_.data(), solved_.data(), size});
   node->system.Solve(node->problem, node->solution.modes, solved_.data(), size);
-  lu_.compute(Eigen::MatrixXd::Identity(size, size) - solved_.topRows(size));
+  lu_.Compute(Eigen::MatrixXd::Identity(size, size) - solved_.topRows(size));
 }
 
 void ImplicitStage::Solve(Direction direction, RowMatrixXd* x) const {
-  const Eigen::MatrixXd rhs = *x;
   if (direction == Direction::kForward) {
-    *x = lu_.solve(rhs);
+    lu_.SolveInPlace(x);
   } else {
-    *x = lu_.transpose().solve(rhs);
+    lu_.SolveTransposedInPlace(x);
   }
 }
 

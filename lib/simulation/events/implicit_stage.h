@@ -14,10 +14,10 @@
 // for those of the adjoint. B is dense, with 3 columns for each moving body. IterateStage is the
 // common iteration for values, tangents, adjoints and Jets.
 
-#include <Eigen/LU>
 #include <functional>
 
 #include "tangible/dynamics/jacobian/equation_jacobian.h"
+#include "tangible/math/decompositions.h"
 #include "tangible/simulation/events/event_record.h"
 #include "tangible/simulation/events/tolerances.h"
 
@@ -86,7 +86,7 @@ class ImplicitStage {
  private:
   LocalJacobianScratch scratch_;
   RowMatrixXd place_, solved_;
-  Eigen::PartialPivLU<Eigen::MatrixXd> lu_;
+  PartialLu lu_;
 };
 
 }  // namespace tangible
