@@ -72,6 +72,7 @@ void RolloutCertifier::AddQuality(const ContactProblem<double>& problem,
 }
 
 void RolloutCertifier::AddImpact(const Model<double>& model, long step, Impulses* impact) {
+  if (impact->remainder) return;
   const ModelStructure& s = *model.structure;
   const double threshold = s.settings.restitution_threshold;
   // By Poisson's law the compression decides which contacts rebound.

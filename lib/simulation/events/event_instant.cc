@@ -301,6 +301,19 @@ double EventStepper::ReturnSpeed(const Model<double>& model, const State<double>
   return std::sqrt(2.0 * acceleration * search_.TouchTolerance(model, state, contact));
 }
 
+int EventStepper::NumPairsWithEvents(const Impulses& impact) const {
+  int pairs = 0;
+  for (size_t i = 0; i < impact.contacts.size(); ++i) {
+    const ActiveContact& contact = impact.contacts[i];
+    // The contacts of a pair follow each other.
+    const ActiveContact* last = i > 0 ? &impact.contacts[i - 1] : nullptr;
+    const bool is_same = last != nullptr && last->a == contact.a && last->b == contact.b &&
+                         last->joint == contact.joint;
+    pairs += !is_same && counts_.Of(contact) > 0 ? 1 : 0;
+  }
+  return pairs;
+}
+
 double EventStepper::SizeOfGap(const Model<double>& model, const ActiveContact& contact) const {
   return contact.joint >= 0 && model.structure->joints[contact.joint].is_angular
              ? 1.0
@@ -315,7 +328,7 @@ Impulses& EventStepper::BeginImpulses(double t, const State<double>& state) {
   impulses.time = t;
   impulses.inside = inside_;
   impulses.h = 0.0;
-  impulses.decompression = impulses.holds = false;
+  impulses.decompression = impulses.remainder = impulses.holds = false;
   impulses.before = state;
   impulses.contacts.clear();
   impulses.friction.clear();
@@ -415,7 +428,8 @@ double EventStepper::SlowSpeed(const Model<double>& model, const State<double>& 
 // than the restitution threshold), it stays closed: all touching contacts there are held, along
 // their tangents too where they slide no faster. The same is done after a slow impact that only
 // sets a contact sliding, which opens another contact that returns, where this has repeated many
-// times.
+// times. In a crowd, where most impacts come from such contacts of others, it is done with all that
+// leave and slide more slowly than the restitution threshold and would be back within a step.
 bool EventStepper::Settle(const Model<double>& model, const Impulses& impact, State<double>* state,
                           StepReport* outcome) {
   const SimulationSettings& settings = model.structure->settings;
@@ -424,6 +438,10 @@ bool EventStepper::Settle(const Model<double>& model, const Impulses& impact, St
   held.time = impact.time;
   held.middle = inside_;
   held.starts = true;  // contacts held while sliding have friction
+  const bool is_crowd = NumPairsWithEvents(impact) > kCrowdPairs;
+  const double within_step =
+      0.5 * settings.dt * std::hypot(model.parameters[kGravityX], model.parameters[kGravityY]);
+  const double of_crowd = is_crowd ? std::min(settings.restitution_threshold, within_step) : 0.0;
   bool any = false;
   bool all_slow = true;     // no contact approached faster than it would return
   bool any_slides = false;  // although it should stick
@@ -440,8 +458,8 @@ bool EventStepper::Settle(const Model<double>& model, const Impulses& impact, St
     // A decompression elsewhere may have opened what its compression had closed.
     const bool opened = !rebounds_[i] && speed(*state) > slow;
     const double returns =
-        std::max(ReturnSpeed(model, *state, contact),
-                 IsInelastic(model, contact) ? settings.restitution_threshold : 0.0);
+        std::max({ReturnSpeed(model, *state, contact), of_crowd,
+                  IsInelastic(model, contact) ? settings.restitution_threshold : 0.0});
     all_slow = all_slow && speed(impact.before) >= -returns;
     if (mode == ContactMode::kOpen || opened) {
       if (speed(*state) > returns) {
@@ -470,7 +488,7 @@ bool EventStepper::Settle(const Model<double>& model, const Impulses& impact, St
   }
   const bool rattles = std::any_of(impact.contacts.begin(), impact.contacts.end(),
                                    [&](const ActiveContact& c) { return Rattles(model, c); });
-  if (!any && !(rattles && all_slow && any_slides)) {
+  if (!any && !((is_crowd || (rattles && all_slow)) && any_slides)) {
     return true;
   }
   ++outcome->given_up.held_contacts;

@@ -45,6 +45,7 @@ struct Impulses : StepRecord {
   ContactSystem system;
   double inside = 0.0;          ///< the time that tells the pieces on which paths are followed
   bool decompression = false;   ///< of the impulses found by the part before
+  bool remainder = false;       ///< of what rounding left of the approach of the impact before it
   std::vector<int> compressed;  ///< decompression: each contact's index in that part
   /// Behind edges of one instant: what holds has no speed, but a derivative of one until here.
   bool holds = false;

@@ -175,12 +175,24 @@ EventSearch::Sample* EventSearch::At(const Model<double>& model, double length) 
   motion.modes = segment_->modes;
   sample.has_end = false;
   ++evaluations_;
-  sample.good = flow_.Run(model, &motion, &message_);
+  const SolvedNode* first =
+      num_samples_ > 1 && samples_[0].good ? &samples_[0].motion.stages[0] : nullptr;
+  sample.good = flow_.Run(model, &motion, &message_, first);
   if (!sample.good) {
     all_good_ = false;
     motion.after = segment_->before;
   }
   return &sample;
+}
+
+EventSearch::Sample* EventSearch::From(const Model<double>& model, double length) {
+  if (length > 0.0 || segment_->contacts.size() < kLeastContactsByRates) return At(model, length);
+  if (!has_start_) {
+    has_start_ = start_.good = true;
+    start_.length = start_.motion.length = 0.0;
+    start_.motion.after = segment_->before;
+  }
+  return &start_;
 }
 
 // Moves the result of a sample's motion to the segment to which it belongs.
@@ -359,6 +371,35 @@ size_t EventSearch::FirstToEnd(const Model<double>& model, const Event& event) {
   return first;
 }
 
+bool EventSearch::IsClearOfHalf(const Model<double>& model, const Event& trial, double at_start,
+                                double length) {
+  if (segment_->contacts.size() < kLeastContactsByRates) return false;
+  Sample* const sample = At(model, length);
+  const Segment& motion = sample->motion;
+  if (!sample->good || motion.num_stages != NystromTableau::kMost) return false;
+  const ContactSolution<double>& late = motion.stages[3].solution;
+  double at_end = 0.0, half = 0.0;
+  if (trial.kind == EventKind::kSlipEnds) {
+    at_end = ModeValue(model, sample, trial);
+    const double rate_a =
+        SlipRate(model, segment_->before, segment_->time, motion.stages[0].solution.motion, trial);
+    const double rate_b =
+        SlipRate(model, motion.after, segment_->time + length, late.motion, trial);
+    half = 0.5 * (at_start + at_end) + 0.125 * length * (rate_a - rate_b);
+  } else {
+    // The third stage is at half of the motion.
+    const auto value = [&](const ContactSolution<double>& of) {
+      return trial.kind == EventKind::kLiftOff
+                 ? of.normal_impulse[trial.index]
+                 : motion.FrictionLeft(trial.index, motion.friction[trial.index].value, trial.sign,
+                                       of);
+    };
+    at_end = value(late);
+    half = value(motion.stages[2].solution);
+  }
+  return at_end > 0.0 && half > kClearOfHalf * std::min(at_start, at_end);
+}
+
 void EventSearch::SearchClosed(const Model<double>& model, Event* event) {
   if (segment_->contacts.empty()) return;
   // Of few contacts a search in their order costs little.
@@ -386,6 +427,7 @@ void EventSearch::SearchClosed(const Model<double>& model, Event* event) {
       double a = 0.0;
       double fa = at_start;
       for (const double share : {0.5, 1.0}) {
+        if (share < 1.0 && IsClearOfHalf(model, trial, at_start, event->length)) continue;
         const double b = share * event->length;
         const double fb = ModeValue(model, At(model, b), trial);
         if (std::isnan(fb)) return;
@@ -516,6 +558,7 @@ bool EventSearch::Run(const Model<double>& model, const std::vector<ActiveContac
   touching_ = &touching;
   slow_ = SpeedTolerance(model, segment->before);
   num_samples_ = 0;
+  has_start_ = false;
   all_good_ = true;
   const long most = kEvaluationsOfEvent * num_pairs_with_events_ *
                     (1L + model.structure->settings.max_events_per_step);

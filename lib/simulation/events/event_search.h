@@ -107,6 +107,9 @@ class EventSearch {
   };
   class PairSearch;  ///< event_search_pair.cc
   Sample* At(const Model<double>& model, double length);
+  /// The same; where a motion costs much, one of length 0 without its corrections, which rounding
+  /// alone needs there.
+  Sample* From(const Model<double>& model, double length);
   void TakeMotion(Sample* sample, Segment* segment);
   double SpeedAlongPath(const Model<double>& model, int body, double radius) const;
   void FindPairs(const Model<double>& model);
@@ -129,6 +132,10 @@ class EventSearch {
                  const CourseOver& course_over, double tolerance, double from, double to,
                  double* root);
   void SearchClosed(const Model<double>& model, Event* event);
+  /// Where a motion costs much: whether the function of a closed contact, positive at the start of a
+  /// motion of this length, stays so until its half, by the stages and the rates at both ends.
+  bool IsClearOfHalf(const Model<double>& model, const Event& trial, double at_start,
+                     double length);
   /// The closed contact whose mode ends first, by values at both ends of the motion: once its event
   /// is found, the others are dismissed by its instant alone. Else the first one.
   size_t FirstToEnd(const Model<double>& model, const Event& event);
@@ -169,6 +176,8 @@ class EventSearch {
   std::vector<HandOver> hand_overs_;
   std::vector<Sample> samples_;
   int num_samples_ = 0;
+  Sample start_;  ///< of length 0 (From)
+  bool has_start_ = false;
   long evaluations_ = 0;  ///< of the motion, in this step
   int num_pairs_with_events_ = 1;
   bool ends_at_start_ = false;

@@ -141,6 +141,8 @@ struct KnownCourse {
 // From this number of closed contacts on a motion costs so much that the rates at the ends of a
 // bracket are used, which save evaluations of it; fewer keep the bits that they have had.
 inline constexpr size_t kLeastContactsByRates = 12;
+// Of the smaller value at the ends of a motion: what is larger at its half is not evaluated there.
+inline constexpr double kClearOfHalf = 0.25;
 
 // The cubic through the values and rates at both ends of [0, length].
 class HermiteCubic {
@@ -207,7 +209,7 @@ bool EventSearch::FirstRoot(const Model<double>& model, const Gap& gap, const Ra
     double a, fa, b, fb;
   };
   const double smallest = kShortestPart * to;
-  double first = gap(*At(model, from));
+  double first = gap(*From(model, from));
   if (first <= 0.0 && from == 0.0) {
     // A contact without a gap that does not touch at the start is at a change of features: a corner
     // at the end of an edge, which it leaves.

@@ -370,7 +370,7 @@ double EventSearch::PairSearch::Gap(const Sample& sample, Counts counts, bool ha
 // normal plus the effect of rotation.
 double EventSearch::PairSearch::ClosingSpeed(double from, double to, Counts counts) {
   const double any = search_.closing_[a_] + search_.closing_[b_];
-  const Sample& first = *search_.At(model_, from);
+  const Sample& first = *search_.From(model_, from);
   if (!std::isfinite(Gap(first, counts))) {
     return any;
   }
@@ -426,7 +426,7 @@ double EventSearch::PairSearch::BeyondEnds(double from, double to) const {
 KnownCourse EventSearch::PairSearch::CourseOver(double from, double fa, double to, double fb,
                                                 double allowed, Counts counts) {
   // Without a gap at both ends there is no contact whose rate could be used.
-  Sample* const first = search_.At(model_, from);
+  Sample* const first = search_.From(model_, from);
   if (!std::isfinite(fa) || !std::isfinite(fb) || Gap(*first, counts) + allowed != fa) {
     return {};
   }
@@ -447,7 +447,7 @@ void EventSearch::PairSearch::SearchFrom(double from, double allowed, Counts cou
   if (!(from < event_.length)) {
     return;
   }
-  if (Gap(*search_.At(model_, from), counts) > touch_) {
+  if (Gap(*search_.From(model_, from), counts) > touch_) {
     allowed = 0.0;  // it has left
   }
   const bool all = counts == Counts::kAll;

@@ -235,11 +235,14 @@ bool EventStepper::SolveImpacts(const Model<double>& model, double t, State<doub
       group = impacts_.Of(first);
       if (group < 0) continue;
     }
+    const double struck = impacts_.Struck(group);
+    const bool is_remainder = approach <= kRemainder * struck;
     impacts_.SetStruck(group, approach);
-    if (!CountImpact(model, slow, group, outcome)) {
+    if (!is_remainder && !CountImpact(model, slow, group, outcome)) {
       return false;
     }
     Impulses* impact = ListImpact(model, t, slow, group, *state, outcome);
+    impact->remainder = is_remainder;
     if (!SolveImpact(model, impact, state, outcome)) {
       return false;
     }

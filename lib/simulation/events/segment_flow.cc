@@ -235,7 +235,8 @@ bool SegmentFlow::HasConverged(const SolvedNode& stage, const std::vector<double
   return true;
 }
 
-bool SegmentFlow::Integrate(const Model<double>& model, Segment* segment, std::string* message) {
+bool SegmentFlow::Integrate(const Model<double>& model, Segment* segment, const SolvedNode* first,
+                            std::string* message) {
   const ModelStructure& structure = *model.structure;
   const NystromTableau& tableau = NystromTableau::Of(IntegratorOf(structure.settings));
   const double tau = segment->length;
@@ -249,6 +250,10 @@ bool SegmentFlow::Integrate(const Model<double>& model, Segment* segment, std::s
       if (!SolveImplicitStage(model, segment, message)) {
         return false;
       }
+      continue;
+    }
+    if (i == 0 && first != nullptr && tableau.c[0] == 0.0) {
+      segment->stages[0] = *first;
       continue;
     }
     PlaceStageOf(model, tableau, *segment, i, i, &state);
@@ -427,7 +432,7 @@ void SetUpProjection(const Segment& segment, const State<double>& state, Impulse
   projection->time = segment.time + segment.length;
   projection->inside = segment.middle;
   projection->h = 0.0;
-  projection->decompression = projection->holds = false;
+  projection->decompression = projection->remainder = projection->holds = false;
   projection->before = state;
   projection->contacts = segment.contacts;
   projection->friction = segment.friction;
@@ -542,11 +547,12 @@ bool SegmentFlow::RunUncorrected(const Model<double>& model, Segment* segment,
                                  std::string* message) {
   segment->num_corrections = 0;
   segment->projects_twists = false;
-  return Integrate(model, segment, message);
+  return Integrate(model, segment, nullptr, message);
 }
 
-bool SegmentFlow::Run(const Model<double>& model, Segment* segment, std::string* message) {
-  if (!Integrate(model, segment, message)) return false;
+bool SegmentFlow::Run(const Model<double>& model, Segment* segment, std::string* message,
+                      const SolvedNode* first) {
+  if (!Integrate(model, segment, first, message)) return false;
   if (CorrectPoses(model, segment, message)) return ProjectTwists(model, segment, message);
   // If no twist satisfies the joints, no poses do either, and the message names these joints.
   std::string why;

@@ -104,8 +104,10 @@ class SegmentFlow {
   void Retarget(const Model<double>& model) { lengths_ = Lengths(model); }
 
   /// Fills stages, corrections, projection and `after` of a segment whose time, length, middle,
-  /// before, contacts, friction and modes are set. False with a message where it fails.
-  bool Run(const Model<double>& model, Segment* segment, std::string* message);
+  /// before, contacts, friction and modes are set. `first`: the first stage of the same segment with
+  /// another length, which does not depend on it, or nullptr. False with a message where it fails.
+  bool Run(const Model<double>& model, Segment* segment, std::string* message,
+           const SolvedNode* first = nullptr);
 
   /// The same without corrections, for a segment of zero length: `after` is `before`.
   bool RunUncorrected(const Model<double>& model, Segment* segment, std::string* message);
@@ -121,7 +123,8 @@ class SegmentFlow {
 
  private:
   bool Solve(const std::vector<ContactMode>& modes, SolvedNode* node);
-  bool Integrate(const Model<double>& model, Segment* segment, std::string* message);
+  bool Integrate(const Model<double>& model, Segment* segment, const SolvedNode* first,
+                 std::string* message);
   bool SolveImplicitStage(const Model<double>& model, Segment* segment, std::string* message);
   bool HasConverged(const SolvedNode& stage, const std::vector<double>& last, int iteration);
   struct PoseErrors;

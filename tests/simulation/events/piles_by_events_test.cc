@@ -180,6 +180,37 @@ TEST(PilesByEventsTest, DiscsThatJustFitOnRoundPlacesNeedNoLastMethods) {
   EXPECT_LE(run.energy, 1e-12);
 }
 
+// A heap that bounces comes to rest: what one impact opens slowly elsewhere is held, where it would
+// only close again a millionth of a second later and open others. With a threshold of 0 it does.
+TEST(PilesByEventsTest, AHeapThatBouncesComesToRest) {
+  std::mt19937_64 random(3);
+  std::uniform_real_distribution<double> unit(0.0, 1.0);
+  Scene scene = Empty(Integrator::kRungeKutta4, 2.5);
+  scene.simulation.dt = 0.002;
+  scene.bodies.push_back(Wall("left", 1.0, 0.0, -0.5));
+  scene.bodies.push_back(Wall("right", -1.0, 0.0, -0.5));
+  for (int i = 0; i < 12; ++i) {
+    scene.bodies.push_back(Moving("disc" + std::to_string(i), {ShapeType::kCircle, {0.1}},
+                                  -0.375 + 0.25 * (i % 4) + 0.01 * unit(random),
+                                  0.12 + 0.21 * static_cast<double>(i / 4)));
+  }
+  for (BasicBody<double>& body : scene.bodies) {
+    body.friction = 0.5;
+    body.restitution = 0.5;
+  }
+  const Fallen run = RunOf(scene);
+  ASSERT_EQ(run.report.status, StepStatus::kDone) << run.report.message;
+  EXPECT_LE(run.deepest, 1e-9);
+  EXPECT_LE(run.energy, 1e-7);
+  EXPECT_LE(run.report.events, 4000);
+  scene.simulation.duration = 0.5;
+  const long held = RunOf(scene).report.events;
+  scene.simulation.restitution_threshold = 0.0;
+  const Fallen bouncing = RunOf(scene);
+  ASSERT_EQ(bouncing.report.status, StepStatus::kDone) << bouncing.report.message;
+  EXPECT_GT(bouncing.report.events, 2 * held);
+}
+
 // Bodies of every shape with little or much friction and restitution, by either law of impact.
 TEST(PilesByEventsTest, ShapesThatFallInHeapsRun) {
   std::mt19937_64 random(11);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Friction where nothing else acts, or next to nothing: joints that coast, stop and are pushed
-// again, and contacts that only a force presses together.
+// again, contacts that only a force presses together, and impacts after which nothing acts.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -365,6 +365,45 @@ TEST(UnloadedFrictionTest, LinksCoastToRest) {
         SCOPED_TRACE(Text(turn) + " rad/s, " + Text(friction) + " N m, dt " + Text(dt));
         for (const double speed : StateAfter(scene).twist) EXPECT_NEAR(speed, 0.0, 1e-12);
       }
+    }
+  }
+}
+
+// What an inelastic impact has stopped has only the rounding of its speed left, which is no other
+// impact: a disc at a wall, a link at its limit, a tether that is taut, two discs that go on as one.
+TEST(UnloadedImpactTest, AnInelasticImpactIsOneEvent) {
+  for (const double speed : {1.0, 1.1, 0.7, 2.0, 3e-7, 4e5}) {
+    const std::string still = R"({"name": "a", "mass": 1, "inertia": 0.1, "position": [1, 0], )";
+    const std::string moves = R"("velocity": [)" + Text(speed) + ", 0]}], ";
+    const std::string scenes[] = {
+        R"("bodies": [{"name": "a", "shape": {"circle": {"radius": 0.1}}, "mass": 0.3,
+           "position": [0.1, 0], )" +
+            moves.substr(0, moves.size() - 3) +
+            R"(, {"name": "w", "static": true, "shape": {"half_plane": {"normal": [-1, 0],
+           "offset": )" +
+            Text(-0.2 - 0.6137 * speed) + "}}}]",
+        R"("bodies": [{"name": "a", "shape": {"circle": {"radius": 0.1}}, "mass": 0.3,
+           "position": [0.1, 0], )" +
+            moves.substr(0, moves.size() - 3) +
+            R"(, {"name": "b", "shape": {"circle": {"radius": 0.1}}, "mass": 2, "position": [)" +
+            Text(0.3 + 0.6137 * speed) + ", 0]}]",
+        R"("bodies": [)" + still + moves +
+            R"("joints": [{"name": "j", "type": "distance", "bodies": ["a", "world"],
+           "anchors": [[1, 0], [0, 0]], "limits": [0, )" +
+            Text(1.0 + 0.6137 * speed) + "]}]",
+        R"("bodies": [)" + still + R"("velocity": [0, )" + Text(speed) +
+            R"(], "angular_velocity": )" + Text(speed) +
+            R"(}], "joints": [{"name": "j", "type": "revolute", "bodies": ["a", "world"],
+           "anchor": [0, 0], "limits": [-9, )" +
+            Text(0.6137 * speed) + "]}]"};
+    for (const std::string& scene : scenes) {
+      SCOPED_TRACE(scene);
+      Model<double> model;
+      State<double> state;
+      BuildModel(SceneOf(Head(0.0) + scene + ByEventsFor(1.5)), &model, &state);
+      const RolloutReport report = Rollout(model, state, {}, &state);
+      EXPECT_EQ(report.message, "");
+      EXPECT_EQ(report.events, 1);
     }
   }
 }
