@@ -31,12 +31,12 @@ bool HaveJets() {
 }
 
 // At most so many numbers through unrolled Jets, evenly spread: they take a hundred times longer.
-int MaxUnrolled() { return testing::Thorough() ? 24 : 8; }
+int MaxUnrolled() { return testing::Thorough() ? 24 : 4; }
 // At most so many through differences, which take 40 runs each.
-int MaxDifferenced() { return testing::Thorough() ? 32 : 12; }
+int MaxDifferenced() { return testing::Thorough() ? 32 : 6; }
 // Longer runs are cut here: their derivatives are summed from as many steps, but each number takes
 // nine runs of differences.
-constexpr double kMaxSteps = 2000;
+double MaxSteps() { return testing::Thorough() ? 2000.0 : 1000.0; }
 // An entry of differences whose own error estimate is above this fraction decides nothing.
 constexpr double kResolved = 1e-3;
 
@@ -58,7 +58,7 @@ Scene Load(const std::string& name) {
   std::string error;
   EXPECT_TRUE(LoadScene(TANGIBLE_SOURCE_DIR "/data/scenes/" + name + ".json", &scene, &error))
       << error;
-  scene.simulation.duration = std::min(scene.simulation.duration, kMaxSteps * scene.simulation.dt);
+  scene.simulation.duration = std::min(scene.simulation.duration, MaxSteps() * scene.simulation.dt);
   return scene;
 }
 

@@ -99,6 +99,17 @@ int MostEvents(const Model<double>& model) {
   return kGiveUp * model.structure->settings.max_events_per_step + kGiveUp;
 }
 
+// Friction may hold bodies between others however hard these are pressed, where rebounds would have
+// to move them: such an impact has impulses without rebounds alone. Whether it had any.
+bool TakeRebounds(Impulses* impact, std::vector<bool>* rebounds) {
+  if (std::find(rebounds->begin(), rebounds->end(), true) == rebounds->end()) return false;
+  rebounds->assign(rebounds->size(), false);
+  for (ActiveContact& contact : impact->contacts) {
+    if (contact.law == ContactLaw::kRestitution) contact.law = ContactLaw::kInelastic;
+  }
+  return true;
+}
+
 }  // namespace
 
 void SizeGuess(const ContactProblem<double>& problem, ContactSolution<double>* guess) {
@@ -252,16 +263,24 @@ bool EventStepper::SolveImpacts(const Model<double>& model, double t, State<doub
 bool EventStepper::SolveImpact(const Model<double>& model, Impulses* impact, State<double>* state,
                                StepReport* outcome) {
   const SimulationSettings& settings = model.structure->settings;
-  AssembleImpulses(model, &assembly_, impact);
-  SizeGuess(impact->problem, &impact->solution);
-  for (size_t i = 0; i < impact->contacts.size(); ++i) {
-    impact->solution.modes[i] =
-        impact->problem.contacts[i].has_friction ? ContactMode::kSticking : ContactMode::kClosed;
-  }
-  const ContactSolverReport solved =
-      solver_.Solve(impact->problem, SolverOptionsOf(settings), &impact->solution);
-  CountSolve(solved, outcome);
+  const auto solve = [&] {
+    AssembleImpulses(model, &assembly_, impact);
+    SizeGuess(impact->problem, &impact->solution);
+    for (size_t i = 0; i < impact->contacts.size(); ++i) {
+      impact->solution.modes[i] =
+          impact->problem.contacts[i].has_friction ? ContactMode::kSticking : ContactMode::kClosed;
+    }
+    const ContactSolverReport report =
+        solver_.Solve(impact->problem, SolverOptionsOf(settings), &impact->solution);
+    CountSolve(report, outcome);
+    return report;
+  };
+  ContactSolverReport solved = solve();
   if (!solved.solved && HoldsSlow(model, impact, state, outcome)) return true;
+  if (!solved.solved && TakeRebounds(impact, &rebounds_)) {
+    ++outcome->given_up.rebounds_given_up;
+    solved = solve();
+  }
   if (!solved.solved) {
     outcome->residual = solved.residual;
     outcome->message = "impact: " + WhatIsUnsolved(*model.structure, *impact, solved);

@@ -476,9 +476,15 @@ bool SegmentFlow::ProjectTwists(const Model<double>& model, Segment* segment,
   // Where friction in joints has stopped all bodies, and no force acts, speeds are rounding.
   const double rest = kLoadShare * segment->length *
                       LimitAcceleration(segment->stages[segment->num_stages - 1].problem);
+  const ModelStructure& s = *model.structure;
   for (size_t k = 0; k < terms_.size(); ++k) {
     const double speed = k % 3 == 2 ? fastest / lever(k / 3) : fastest;
     terms_[k] = segment->length * terms_[k] + std::abs(v[k]) + kSpeedOfTerms * speed + rest;
+    // After an impact that has stopped all bodies too, where no force acts: a residual that moves a
+    // body in a step by no more than the rounding of its coordinates contradicts nothing.
+    const int body = s.moving[k / 3];
+    const double unmoved = lengths_.Rounding(segment->before, body, body) / s.settings.dt;
+    terms_[k] += (k % 3 == 2 ? unmoved / lever(k / 3) : unmoved) / kUnmetRow;
   }
   const int joint =
       segment->length > 0.0

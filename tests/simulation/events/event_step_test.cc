@@ -234,6 +234,35 @@ TEST(EventStepTest, PainlevesRodIsGivenAnImpulse) {
 }
 
 // The accelerations of a tall one are rounding, and differ from iteration to iteration.
+// Spin presses the disc against the wall by μ times the floor's impulse, and the wall holds it down
+// by μ² times that: for μ ≥ 1 nothing lifts it, and no impulses give the floor's rebound. It stays
+// in the corner, where friction takes its spin.
+TEST(EventStepTest, ADiscThatSpinsIntoACornerStaysThere) {
+  for (const double friction : {0.9, 1.0, 1.5}) {
+    for (const double restitution : {0.2, 0.9}) {
+      const std::string surface = R"("friction": )" + std::to_string(friction) +
+                                  R"(, "restitution": )" + std::to_string(restitution);
+      const Rolled run = Simulate(
+          R"({"bodies": [{"name": "disc", "shape": {"circle": {"radius": 0.1}}, "mass": 1, )" +
+          surface + R"(, "position": [0.1, 0.101], "velocity": [0, -0.3], "angular_velocity": 2},
+          {"name": "floor", "static": true, )" +
+          surface + R"(, "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}},
+          {"name": "wall", "static": true, )" +
+          surface + R"(, "shape": {"half_plane": {"normal": [1, 0], "offset": 0}}}], )" +
+          Settings("runge_kutta_4", 2.0) + "}");
+      EXPECT_NEAR(run.final.pose[1], 0.1, 1e-9) << friction;
+      EXPECT_GE(run.final.pose[0], 0.1 - 1e-9);
+      if (friction < 1.0) {
+        EXPECT_EQ(run.report.given_up.rebounds_given_up, 0);
+        continue;
+      }
+      EXPECT_NEAR(run.final.pose[0], 0.1, 1e-9);
+      EXPECT_GE(run.report.given_up.rebounds_given_up, 1);
+      for (int i = 0; i < 3; ++i) EXPECT_NEAR(run.final.twist[i], 0.0, 1e-9);
+    }
+  }
+}
+
 TEST(EventStepTest, StacksStayWhereTheyAre) {
   for (const int count : {4, 20}) {
     std::string bodies;
