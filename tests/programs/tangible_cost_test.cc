@@ -59,6 +59,17 @@ TEST_F(TangibleCostTest, ABrokenBoundIsExitStatusOne) {
   EXPECT_EQ(Cost(broken + "--bounds=false").exit_status, 0);
 }
 
+TEST_F(TangibleCostTest, ScenesInMotionBesideSettledOnes) {
+  const ProgramRun run =
+      Cost("--scaling --discs=2 --bouncing=2 --pyramids=1 --out='" + Path("r.json") + "'");
+  ASSERT_EQ(run.exit_status, 0) << run.error;
+  EXPECT_NE(run.out.find("2 discs that bounce, by events"), std::string::npos) << run.out;
+  const json scenes = json::parse(Read(Path("r.json")))["scenes"];
+  ASSERT_EQ(scenes.size(), 3u);
+  EXPECT_GT(scenes[2]["in_motion"]["percentile_99_us"], scenes[2]["in_motion"]["mean_us"]);
+  ExpectOneLine(Cost("--scaling --discs=3,2"), 2, "--discs: expected ascending numbers");
+}
+
 TEST_F(TangibleCostTest, WrongFlagsAreUsage) {
   for (const char* flag :
        {"--parameters=", "--parameters=0", "--parameters=8,1", "--parameters=1,,8",

@@ -8,12 +8,14 @@
 #include <cmath>
 #include <iostream>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "tangible/app/program.h"
 #include "tangible/app/progress.h"
 #include "tangible/verification/cost/cost_report.h"
 #include "tangible/verification/cost/cost_scene.h"
+#include "tangible/verification/cost/motion_cost.h"
 #include "tangible/verification/support/provenance.h"
 
 DEFINE_string(parameters, "1,8,64", "numbers of parameters, ascending, separated by commas");
@@ -30,6 +32,11 @@ DEFINE_double(adjoint_bound, 2.0,
 DEFINE_double(tangent_bound, 3.0, "rollouts that the tangent of 8 parameters may take; the same");
 DEFINE_double(jet_bound, 4.0, "rollouts that implicit Jets of 8 derivatives may take; the same");
 DEFINE_bool(bounds, true, "exit with status 1 where a bound does not hold");
+DEFINE_bool(scaling, false,
+            "instead of gradients: steps of scenes of many contacts, in motion and settled");
+DEFINE_string(discs, "10,100", "with --scaling: numbers of discs that fall, ascending");
+DEFINE_string(bouncing, "10", "with --scaling: numbers of discs that bounce, by events, ascending");
+DEFINE_string(pyramids, "10", "with --scaling: boxes at the base of pyramids, ascending");
 DEFINE_string(out, "", "file of all figures (JSON)");
 DEFINE_string(picture, "", "file of a picture of time and memory (SVG)");
 
@@ -65,6 +72,43 @@ bool ReadList(const std::string& text, Number most, std::vector<Number>* list) {
     if (*rest != ',') return false;
     at = rest + 1;
   }
+}
+
+// Empty, or one line about a flag's value.
+std::string CheckScaling(cost::MotionOptions* options) {
+  const std::tuple<const char*, const std::string&, std::vector<int>*> lists[] = {
+      {"--discs", FLAGS_discs, &options->discs},
+      {"--bouncing", FLAGS_bouncing, &options->bouncing},
+      {"--pyramids", FLAGS_pyramids, &options->pyramids}};
+  for (const auto& [flag, text, list] : lists) {
+    list->clear();
+    if (!ReadList(text, kMostParameters, list)) {
+      return std::string(flag) + ": expected ascending numbers from 1 to " +
+             std::to_string(kMostParameters) + ", separated by commas, got '" + text + "'";
+    }
+  }
+  return "";
+}
+
+int RunScaling(const cost::MotionOptions& options) {
+  std::cout << ProvenanceLine() << "\n" << std::flush;
+  Progress progress("scenes", cost::NumMotionRows(options));
+  const std::vector<cost::MotionRow> rows =
+      cost::MeasureAllMotion(options, [&](long done) { progress.Show(done); });
+  std::cout << cost::MotionText(rows) << std::flush;
+  ResultWriter writer;
+  writer.Write(FLAGS_out, [&] {
+    OrderedJson json = {{"provenance", OrderedJson::object()}};
+    for (const auto& [what, value] : Provenance()) json["provenance"][what] = value;
+    json["scenes"] = cost::ToJson(rows);
+    return JsonText(json);
+  });
+  if (!writer.error().empty()) return ReportError(writer.error());
+  for (const cost::MotionRow& row : rows) {
+    if (!row.message.empty())
+      return ReportError("tangible-cost: " + row.scene + ": " + row.message);
+  }
+  return kExitDone;
 }
 
 // Empty, or one line about a flag's value.
@@ -157,17 +201,25 @@ int Main(int argc, char** argv) {
       argc, argv,
       {.name = "tangible-cost",
        .synopsis = "[--full | --parameters=N1,N2 --steps=N1,N2] [--stepping=fixed|event] "
-                   "[--out=R.json] [--picture=P.svg]",
+                   "[--out=R.json] [--picture=P.svg] | --scaling [--discs=N1,N2] "
+                   "[--bouncing=N1,N2] [--pyramids=N1,N2] [--out=R.json]",
        .description =
            "Time and peak memory of the gradient of a rollout by adjoint, tangent, Jets, "
            "differences "
            "and a tape, each cell in a\nprocess of its own. Exit status 1 where a bound does not "
-           "hold.",
+           "hold. With --scaling: times of steps of\nscenes of many contacts, in motion and "
+           "settled; "
+           "exit status 1 where a step is not solved.",
        .version = TANGIBLE_VERSION,
        .source_file = __FILE__,
        .num_positional = 0,
        .outputs = {"out", "picture"}});
   if (line.exit_status) return *line.exit_status;
+  if (FLAGS_scaling) {
+    cost::MotionOptions motion;
+    const std::string wrong = CheckScaling(&motion);
+    return wrong.empty() ? RunScaling(motion) : ReportError("tangible-cost: " + wrong, kExitUsage);
+  }
   CostOptions options;
   CostBounds bounds;
   const std::string wrong = CheckFlags(&options, &bounds);

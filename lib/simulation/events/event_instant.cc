@@ -31,6 +31,9 @@ namespace {
 // Slow impacts count as a rattle after max_events_per_step divided by this.
 constexpr int kRattling = 4;
 
+// An impact in a crowd has contacts of more than this many pairs that have had events in the step.
+constexpr int kCrowdPairs = 2;
+
 // Whether contact i of an impact belongs to a body without joints that touches only fixed bodies on
 // parallel faces, and whose friction is far from reversing the contact law,
 //

@@ -132,8 +132,8 @@ class EventSearch {
                  const CourseOver& course_over, double tolerance, double from, double to,
                  double* root);
   void SearchClosed(const Model<double>& model, Event* event);
-  /// Where a motion costs much: whether the function of a closed contact, positive at the start of a
-  /// motion of this length, stays so until its half, by the stages and the rates at both ends.
+  /// Where a motion costs much: whether the function of a closed contact, positive at the start of
+  /// a motion of this length, stays so until its half, by stages and rates at both ends.
   bool IsClearOfHalf(const Model<double>& model, const Event& trial, double at_start,
                      double length);
   /// The closed contact whose mode ends first, by values at both ends of the motion: once its event

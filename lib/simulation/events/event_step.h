@@ -212,7 +212,7 @@ class EventStepper {
   /// tolerance, m/s (of an angle's rad/s).
   double ReturnSpeed(const Model<double>& model, const State<double>& state,
                      const ActiveContact& contact) const;
-  /// Of an impact's contacts, the pairs of bodies (and the joints) that have had events in the step.
+  /// Of an impact's contacts, the pairs of bodies, and the joints, with events in the step.
   int NumPairsWithEvents(const Impulses& impact) const;
   /// The size of the bodies of a contact, m; of an angle's limit 1 rad.
   double SizeOfGap(const Model<double>& model, const ActiveContact& contact) const;

@@ -104,8 +104,9 @@ class SegmentFlow {
   void Retarget(const Model<double>& model) { lengths_ = Lengths(model); }
 
   /// Fills stages, corrections, projection and `after` of a segment whose time, length, middle,
-  /// before, contacts, friction and modes are set. `first`: the first stage of the same segment with
-  /// another length, which does not depend on it, or nullptr. False with a message where it fails.
+  /// before, contacts, friction and modes are set. `first`: the first stage of the same segment
+  /// with another length, which does not depend on it, or nullptr. False with a message where it
+  /// fails.
   bool Run(const Model<double>& model, Segment* segment, std::string* message,
            const SolvedNode* first = nullptr);
 

@@ -96,8 +96,6 @@ inline constexpr double kLeastSpeed = 1e-200;
 inline constexpr double kRattle = 1e-3;
 /// Of the speed above: an approach speed that is not larger after an impact counts as solved.
 inline constexpr double kSolvedApproach = 100.0;
-/// An impact in a crowd has contacts of more than this many pairs that have had events in the step.
-inline constexpr int kCrowdPairs = 2;
 /// Of the approach before an impact: what is left of it is rounding, and no other impact. Where no
 /// load acts it is all that moves.
 inline constexpr double kRemainder = 1e-12;

@@ -370,7 +370,8 @@ TEST(UnloadedFrictionTest, LinksCoastToRest) {
 }
 
 // What an inelastic impact has stopped has only the rounding of its speed left, which is no other
-// impact: a disc at a wall, a link at its limit, a tether that is taut, two discs that go on as one.
+// impact: a disc at a wall, a link at its limit, a tether that is taut, two discs that go on as
+// one.
 TEST(UnloadedImpactTest, AnInelasticImpactIsOneEvent) {
   for (const double speed : {1.0, 1.1, 0.7, 2.0, 3e-7, 4e5}) {
     const std::string still = R"({"name": "a", "mass": 1, "inertia": 0.1, "position": [1, 0], )";
