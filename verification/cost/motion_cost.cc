@@ -7,7 +7,7 @@
 #include <numeric>
 
 #include "tangible/math/cpu_time.h"
-#include "tangible/simulation/stepping/step.h"
+#include "tangible/simulation/stepping/rollout.h"
 #include "tangible/verification/cost/benchmark_scenes.h"
 
 namespace tangible::cost {
