@@ -35,7 +35,7 @@ struct MotionRow {
   int bodies = 0;     ///< that move
   StepTimes moving, settled;
   long events = 0;            ///< in the moving steps
-  double event_time = 0.0;    ///< µs an event of the moving steps; 0: by fixed steps
+  double event_time = 0.0;    ///< µs of all moving steps over `events`; 0: none
   double residual_max = 0.0;  ///< scaled
   std::string message;        ///< empty unless a step was not solved
 };
