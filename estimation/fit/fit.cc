@@ -310,11 +310,10 @@ Minimum BestFrom(const Eigen::VectorXd& start, FitApproach approach, FitRun* run
       told->message = reached[i].approach_message;
     }
   }
-  Minimum result = std::move(reached[best]);
+  Minimum result = reached[best];
   if (result.approach == FitApproach::kTrial) {  // no other approach has led anywhere
     result.approach = FitApproach::kPlain;
   }
-  reached.clear();
   return result;
 }
 
@@ -343,6 +342,8 @@ FinishedStart MakeStart(int number, const Eigen::VectorXd& start, FitApproach ap
   if (is_first && start != initial && minimum.cost > initial_cost) {
     KeepInitial(initial, run, &minimum);
   }
+  run->log->reached
+      .clear();  // not before: an interruption while KeepInitial runs begins behind them
   const bool elsewhere = start != initial || minimum.approach != FitApproach::kPlain;
   if (is_first && elsewhere && !minimum.iterations.empty() && std::isfinite(initial_cost)) {
     minimum.iterations.insert(
@@ -476,7 +477,9 @@ void RunStarts(FitRun* run, FitResult* result) {
       RunStart(start, run->options.approach, first, result->initial_cost, run);
     }
   }
-  if (run->options.starts == 0 && (log->starts.size() > 1 || MayHaveOthers(run))) {
+  // Where a second start was begun before an interruption, this was asked and its runs were counted.
+  const bool others = log->starts.size() > 1 || log->shot || !log->reached.empty();
+  if (run->options.starts == 0 && (others || MayHaveOthers(run))) {
     for (const double side : {1.0, -1.0}) {
       if (!is_done(side > 0.0 ? 1 : 2)) {
         // It is one more look, and no search: without progress it ends at once.

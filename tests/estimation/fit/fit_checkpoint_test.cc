@@ -85,6 +85,94 @@ TEST(FitCheckpointTest, EndsAtTheSameBitsWhereverItWasInterrupted) {
   }
 }
 
+/// Runs a fit, and then again from every checkpoint that it wrote; all are to end with the same bits.
+template <typename FitOnce>
+void ExpectTheSameBitsFromEveryCheckpoint(const FitOnce& fit) {
+  const FitProblem any = PendulumProblem();
+  std::vector<std::string> texts;
+  FitCheckpoint checkpoint(InputOf(any), {});
+  FitLog* const log = checkpoint.Next();
+  const auto keep = [&] { texts.push_back(checkpoint.Text()); };
+  log->on_end = keep;
+  log->search.OnIteration(keep);
+  log->start.OnIteration(keep);
+  const std::string whole = fit(log);
+  ASSERT_GT(texts.size(), 3u);
+  for (size_t i = 0; i < texts.size(); ++i) {
+    FitCheckpoint read(InputOf(any), [](const std::string&) { return ""; });
+    ASSERT_EQ(read.Restore(texts[i], "c.json"), "");
+    ASSERT_EQ(fit(read.Next()), whole) << i << " of " << texts.size();
+    ASSERT_EQ(read.mismatch(), 0);
+  }
+}
+
+// Through an impact two further starts are made. Whether they are is asked by a run that is
+// counted once.
+TEST(FitCheckpointTest, TheStartsThatAnImpactAsksForAreCountedOnce) {
+  FitProblem problem;
+  problem.scene = MakeScene(R"({"name": "bounce", "bodies": [
+    {"name": "ball", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0, 0.6],
+     "velocity": [0.5, 0], "restitution": 0.6},
+    {"name": "floor", "static": true, "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
+    "simulation": {"dt": 0.01, "duration": 1, "stepping": "event"}})");
+  problem.options.starts = 0;
+  problem.parameters = {Parameter("bodies/ball/restitution", 0.3)};
+  problem.observations = Observe(problem.scene, 5, 0.002, 3);
+  int starts = 0;
+  ExpectTheSameBitsFromEveryCheckpoint([&](FitLog* log) {
+    RolloutResiduals residuals = ResidualsOf(problem);
+    const FitResult fit = Fit(problem.options, &residuals, {}, log);
+    starts = static_cast<int>(fit.starts.size());
+    return HashOf(fit);
+  });
+  EXPECT_EQ(starts, 3);
+}
+
+/// One residual that does not depend on the parameter p below 0.05 and has a minimum above it that
+/// costs more: 1, and 2 + (p − 0.5)².
+class FlatStartProblem : public LeastSquaresProblem {
+ public:
+  const std::vector<ParameterEntry>& entries() const override { return entries_; }
+  int num_shared() const override { return 1; }
+  int num_blocks() const override { return 1; }
+  int num_own(int /*block*/) const override { return 0; }
+  int num_rows(int /*block*/) const override { return 2; }
+  int num_observation_rows(int /*block*/) const override { return 2; }
+  std::vector<RowPlace> Places(int /*block*/) const override {
+    return {{0, 0.0, 0.0}, {0, 1.0, 0.0}};
+  }
+  std::string BlockName(int /*block*/) const override { return "block 0: "; }
+  bool EvaluateBlock(int /*block*/, const Eigen::VectorXd& p, GradientMethod /*method*/,
+                     BlockDerivatives derivatives, BlockEvaluation* evaluation) override {
+    evaluation->rollouts = 1;
+    const bool flat = p[0] < 0.05;
+    const double offset = p[0] - 0.5;
+    evaluation->residuals =
+        flat ? Eigen::Vector2d(1.0, 0.5) : Eigen::Vector2d(2.0 + offset * offset, offset);
+    if (derivatives == BlockDerivatives::kCompute) {
+      evaluation->jacobian.setZero(2, 1);
+      if (!flat) evaluation->jacobian << 2.0 * offset, 1.0;
+    }
+    return true;
+  }
+
+ private:
+  std::vector<ParameterEntry> entries_ = {{"p", 0.0, 0.0, 1.0, false, 1.0}};
+};
+
+TEST(FitCheckpointTest, GoesOnWhereTheInitialValuesAreMinimisedFromAfterAll) {
+  FitOptions options;
+  options.starts = 1;
+  double cost = 0.0;
+  ExpectTheSameBitsFromEveryCheckpoint([&](FitLog* log) {
+    FlatStartProblem problem;
+    const FitResult fit = Fit(options, &problem, {}, log);
+    cost = fit.final_cost;
+    return HashOf(fit);
+  });
+  EXPECT_EQ(cost, 0.625);
+}
+
 // A finished fit needs no run but the one at the estimate, of which nothing is kept.
 TEST(FitCheckpointTest, WhatIsDoneIsNotDoneAgain) {
   FitProblem problem = PendulumProblem();
