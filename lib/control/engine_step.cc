@@ -40,6 +40,17 @@ std::vector<int> DampingOf(const ModelStructure& structure) {
   return numbers;
 }
 
+// Whether any contact or limit can be reached.
+bool MayTouch(const ModelStructure& structure) {
+  if (structure.has_limits) return true;
+  for (int i = 0; i < structure.num_bodies(); ++i) {
+    for (int j = i + 1; j < structure.num_bodies(); ++j) {
+      if (structure.MayCollide(i, j)) return true;
+    }
+  }
+  return false;
+}
+
 }  // namespace
 
 // The scene in which some bodies pass through each other, and its steps.
@@ -183,7 +194,7 @@ JointState::Outcome EngineStep::ProjectOntoJoints(long k, VectorX<double>* x, do
 std::string EngineStep::DiscreteMapOf(long first, const RowMatrixXd& states,
                                       const RowMatrixXd& controls) {
   const ModelStructure& s = *model_.structure;
-  if (s.settings.stepping != Stepping::kFixed) return "";
+  if (s.settings.stepping != Stepping::kFixed || !MayTouch(s)) return "";
   DiscreteMapWatch watch(model_);
   VectorX<double> next;
   std::string error;
