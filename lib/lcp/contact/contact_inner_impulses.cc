@@ -1,11 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/lcp/contact/contact_inner_impulses.h"
 
+#include <algorithm>
 #include <cmath>
 
+#include "tangible/lcp/contact/tolerances.h"
 #include "tangible/lcp/system/contact_residual.h"
 
 namespace tangible {
+namespace {
+
+// Solves of the short way, each with further contacts pinned.
+constexpr int kMostRounds = 6;
+// With more contacts the short way pins friction near its limit alone.
+constexpr size_t kFewToPin = 24;
+
+}  // namespace
 
 void InnerImpulses::AddRays(const ContactProblem<double>& problem, double tolerance,
                             const ContactSolution<double>& solution) {
@@ -71,11 +81,97 @@ void InnerImpulses::TakeRays(const ContactProblem<double>& problem) {
   }
 }
 
+bool InnerImpulses::IsSolution(const ContactProblem<double>& problem, double tolerance) {
+  int worst;
+  if (!(NaturalResidual(problem, chosen_, &worst) <= ContactSolverOptions().tolerance)) {
+    return false;
+  }
+  FindDegenerateContacts(problem, chosen_, tolerance, &degenerate_);
+  return true;
+}
+
+namespace {
+
+/// The mode of a contact that touches with this slip and is inside its cone where it may be.
+ContactMode InnerMode(const ContactBlock<double>& contact, const ContactValues& values,
+                      double tolerance) {
+  const bool slips = std::abs(values.slip) > tolerance * values.scale_t;
+  return !contact.has_friction ? ContactMode::kClosed
+         : !slips              ? ContactMode::kSticking
+         : values.slip > 0.0   ? ContactMode::kSlidingPositive
+                               : ContactMode::kSlidingNegative;
+}
+
+}  // namespace
+
+void InnerImpulses::TakeInnerModes(const ContactProblem<double>& problem, double tolerance,
+                                   const ContactSolution<double>& solution) {
+  const ContactScales scales(problem, solution);
+  impulse_scale_ = scales.impulse;
+  chosen_ = solution;
+  for (size_t i = 0; i < problem.contacts.size(); ++i) {
+    const ContactBlock<double>& contact = problem.contacts[i];
+    if (contact.limit_given || contact.driven) continue;
+    const ContactValues values = Evaluate(problem, scales, contact, solution.motion.data());
+    const bool touches = std::abs(values.s_n) <= tolerance * values.scale_n;
+    if (touches || chosen_.modes[i] != ContactMode::kOpen) {
+      chosen_.modes[i] = InnerMode(contact, values, tolerance);
+    }
+  }
+  inner_modes_ = chosen_.modes;
+  pinned_ = problem;
+}
+
+bool InnerImpulses::PinAtLimits(const ContactProblem<double>& problem, double share) {
+  bool any = false;
+  for (size_t i = 0; i < problem.contacts.size(); ++i) {
+    const ContactBlock<double>& contact = problem.contacts[i];
+    if (chosen_.modes[i] == ContactMode::kOpen || contact.limit_given || contact.driven) continue;
+    ContactBlock<double>& pinned = pinned_.contacts[i];
+    if (!pinned.driven && chosen_.normal_impulse[i] < kLeastShare * impulse_scale_) {
+      pinned.driven = any = true;
+      pinned.offset = kPinnedShare * impulse_scale_;
+    }
+    if (chosen_.modes[i] != ContactMode::kSticking) continue;
+    const double limit = contact.friction * chosen_.normal_impulse[i];
+    if (std::abs(chosen_.tangent_impulse[i]) > (1.0 - kAtLimit) * limit) {
+      pinned.friction = share * contact.friction;
+      chosen_.modes[i] = chosen_.tangent_impulse[i] > 0.0 ? ContactMode::kSlidingNegative
+                                                          : ContactMode::kSlidingPositive;
+      any = true;
+    }
+  }
+  return any;
+}
+
+bool InnerImpulses::ChooseNearby(const ContactProblem<double>& problem, double tolerance,
+                                 double share, const ContactSolution<double>& solution) {
+  TakeInnerModes(problem, tolerance, solution);
+  for (int round = 0; PinAtLimits(problem, share); ++round) {
+    if (round == kMostRounds ||
+        !mode_solve_.Solve(pinned_, &chosen_, &solver_.system(), &chosen_)) {
+      return false;
+    }
+  }
+  chosen_.motion = solution.motion;
+  chosen_.modes = inner_modes_;
+  return IsSolution(problem, tolerance) && degenerate_.empty();
+}
+
 bool InnerImpulses::Choose(const ContactProblem<double>& problem, double tolerance,
                            ContactSolution<double>* solution) {
   FindDegenerateContacts(problem, *solution, tolerance, &degenerate_);
   if (degenerate_.empty()) return false;
   const size_t before = degenerate_.size();
+  for (const double share : kPinnedFriction) {
+    // Of many contacts some are not inside by far.
+    const bool is_far = share < kPinnedFriction[1] && problem.contacts.size() > kFewToPin;
+    if (problem.has_rolling || is_far) continue;
+    if (ChooseNearby(problem, tolerance, share, *solution)) {
+      std::swap(*solution, chosen_);
+      return true;
+    }
+  }
   AddRays(problem, tolerance, *solution);
   shares_ = ContactSolution<double>();
   shares_.joint_impulse.assign(solution->joint_impulse.size(), 0.0);
@@ -87,10 +183,7 @@ bool InnerImpulses::Choose(const ContactProblem<double>& problem, double toleran
   if (!solver_.Solve(by_rays_, options, &shares_).solved) return false;
   chosen_ = *solution;
   TakeRays(problem);
-  int worst;
-  if (!(NaturalResidual(problem, chosen_, &worst) <= options.tolerance)) return false;
-  FindDegenerateContacts(problem, chosen_, tolerance, &degenerate_);
-  if (degenerate_.size() >= before) return false;
+  if (!IsSolution(problem, tolerance) || degenerate_.size() >= before) return false;
   std::swap(*solution, chosen_);
   return true;
 }

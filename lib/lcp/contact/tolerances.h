@@ -19,6 +19,15 @@ inline constexpr double kFirstRegularisation = 1e-7;
 /// Of the r M⁻¹ rᵀ of the row: δ of the later proximal steps of pivoting: at 1e-10 one path in 400
 /// of a pile of 100 discs was lost to rounding.
 inline constexpr double kLeastRegularisation = 1e-8;
+/// Of the limit of friction: what is at it is pinned at this share of it, the first one where there
+/// are few contacts.
+inline constexpr double kPinnedFriction[] = {0.7, 0.99};
+/// Of the limit of friction: friction that is nearer to it is at it.
+inline constexpr double kAtLimit = 1e-3;
+/// Of the largest normal impulse: a contact with less carries no load.
+inline constexpr double kLeastShare = 1e-3;
+/// Of the largest normal impulse: the load at which such a contact is pinned.
+inline constexpr double kPinnedShare = 0.02;
 /// Of an impulse's way to its limit: extrapolated impulses end this far beyond the limit, so that
 /// the mode changes.
 inline constexpr double kBeyondLimit = 1e-6;
