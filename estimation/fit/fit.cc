@@ -477,7 +477,7 @@ void RunStarts(FitRun* run, FitResult* result) {
       RunStart(start, run->options.approach, first, result->initial_cost, run);
     }
   }
-  // Where a second start was begun before an interruption, this was asked and its runs were counted.
+  // Where a second start was begun before an interruption, this was asked and its runs counted.
   const bool others = log->starts.size() > 1 || log->shot || !log->reached.empty();
   if (run->options.starts == 0 && (others || MayHaveOthers(run))) {
     for (const double side : {1.0, -1.0}) {

@@ -25,8 +25,8 @@
 // a problem of contacts without friction. It is monotone, its motion is v' = v, and the central
 // path of the interior point method ends inside its set of solutions, where as many α as possible
 // are positive. A contact is inside its cone where both of its rays are.
-// A short way is tried first. All contacts without slip stick, but what is at a limit is pinned just
-// inside it: friction at a share of the limit (as if it slid with less friction), a normal impulse
+// A short way is tried first. All contacts without slip stick, but what is at a limit is pinned
+// just inside it: friction at a share of the limit (as if it slid with less friction), a normal impulse
 // of 0 at a small one (as if it were driven). Of the impulses with the same motion a proximal step
 // finds the nearest; what it takes to a limit is pinned too, until nothing is. Where the impulses
 // leave the motion as it is they are inside (1), and such points all have the same derivatives.
@@ -57,8 +57,8 @@ class InnerImpulses {
   void AddRays(const ContactProblem<double>& problem, double tolerance,
                const ContactSolution<double>& solution);
   void TakeRays(const ContactProblem<double>& problem);
-  /// The short way to chosen_, with friction pinned at `share` of its limit; false where it leaves a
-  /// contact at a limit, or another motion.
+  /// The short way to chosen_, with friction pinned at `share` of its limit; false where it leaves
+  /// a contact at a limit, or another motion.
   bool ChooseNearby(const ContactProblem<double>& problem, double tolerance, double share,
                     const ContactSolution<double>& solution);
   /// Its first step: the modes of contacts inside their cones.

@@ -85,7 +85,7 @@ TEST(FitCheckpointTest, EndsAtTheSameBitsWhereverItWasInterrupted) {
   }
 }
 
-/// Runs a fit, and then again from every checkpoint that it wrote; all are to end with the same bits.
+/// Runs a fit, and then again from every checkpoint that it wrote; all end with the same bits.
 template <typename FitOnce>
 void ExpectTheSameBitsFromEveryCheckpoint(const FitOnce& fit) {
   const FitProblem any = PendulumProblem();
