@@ -26,10 +26,11 @@
 // path of the interior point method ends inside its set of solutions, where as many α as possible
 // are positive. A contact is inside its cone where both of its rays are.
 // A short way is tried first. All contacts without slip stick, but what is at a limit is pinned
-// just inside it: friction at a share of the limit (as if it slid with less friction), a normal impulse
-// of 0 at a small one (as if it were driven). Of the impulses with the same motion a proximal step
-// finds the nearest; what it takes to a limit is pinned too, until nothing is. Where the impulses
-// leave the motion as it is they are inside (1), and such points all have the same derivatives.
+// just inside it: friction at a share of the limit (as if it slid with less friction), a normal
+// impulse of 0 at a small one (as if it were driven). Of the impulses with the same motion a
+// proximal step finds the nearest; what it takes to a limit is pinned too, until nothing is. Where
+// the impulses leave the motion as it is they are inside (1), and such points all have the same
+// derivatives.
 // Source: O. Güler, Y. Ye, Convergence behavior of interior-point algorithms, Math. Programming 60
 // (1993) 215: the limit is a strictly complementary solution where there is one.
 
