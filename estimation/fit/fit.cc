@@ -342,8 +342,8 @@ FinishedStart MakeStart(int number, const Eigen::VectorXd& start, FitApproach ap
   if (is_first && start != initial && minimum.cost > initial_cost) {
     KeepInitial(initial, run, &minimum);
   }
-  run->log->reached
-      .clear();  // not before: an interruption while KeepInitial runs begins behind them
+  // Not before: what goes on after an interruption within KeepInitial begins behind them.
+  run->log->reached.clear();
   const bool elsewhere = start != initial || minimum.approach != FitApproach::kPlain;
   if (is_first && elsewhere && !minimum.iterations.empty() && std::isfinite(initial_cost)) {
     minimum.iterations.insert(
