@@ -261,6 +261,8 @@ double DistanceOfRun(const Outline& outline, int run, const Pose<double>& pose,
   const Vector2<double> ends[2] = {of.start, outline.EndPlace(run)};
   double best = kInfinity;
   double nearest = kInfinity;
+  bool meets = false;
+  int sides[2] = {0, 0};  // of the core's edges, on whose left the run's start is, or the right
   for (int j = 0; j < core.Size(); ++j) {
     const Vector2<double> x = core.VertexAt(j);
     best = std::min(best, internal::DistanceOfSegment(ends[0], ends[1], x));
@@ -277,11 +279,32 @@ double DistanceOfRun(const Outline& outline, int run, const Pose<double>& pose,
       for (const Vector2<double>& end : ends) {
         best = std::min(best, internal::DistanceOfSegment(x, next, end));
       }
+      meets = meets || internal::SegmentsMeet(ends[0], ends[1], x, next);
+      ++sides[Cross(Vector2<double>(next - x), Vector2<double>(ends[0] - x)) > 0.0 ? 0 : 1];
     }
   }
+  // Within the core the run's start is on the same side of all its edges.
+  if (meets || (core.Size() > 2 && (sides[0] == 0 || sides[1] == 0))) best = 0.0;
   const double radius =
       shape.type == ShapeType::kEllipse ? BoundingRadius(shape) : CoreRadius(shape);
   return best - radius;
+}
+
+bool IsInSolidBehind(const Outline& outline, int run, const Pose<double>& pose,
+                     const ShapeView<double>& shape, const Pose<double>& shape_pose,
+                     double margin) {
+  if (!outline.IsPolygon()) return false;
+  const OutlineRun& of = outline.run(run);
+  const Pose<double> relative = internal::RelativeTo(pose, shape_pose);
+  const internal::ConvexCore core(shape, relative, Vector2<double>(0.0, 0.0));
+  const double radius = CoreRadius(shape);
+  for (int j = 0; j < core.Size(); ++j) {
+    const Vector2<double> lowest = core.VertexAt(j) - radius * of.normal;
+    const double along = of.tangent.dot(lowest - of.start);
+    const bool is_behind = of.normal.dot(lowest - of.start) < -margin;
+    if (is_behind && along > 0.0 && along < of.length && outline.Contains(lowest)) return true;
+  }
+  return false;
 }
 
 }  // namespace tangible

@@ -149,14 +149,19 @@ struct PlacedRun {
 int FindFeaturesOfRuns(const PlacedRun& a, const PlacedRun& b, double max_gap,
                        ContactFeature features[2]);
 
-/// The distance of two runs that do not cross, m. Sets the ends that are nearest.
+/// The distance of two runs, 0 where they cross, m. Sets the ends that are nearest.
 double DistanceOfRuns(const PlacedRun& a, const PlacedRun& b, int* end_a, int* end_b);
 
-/// A lower bound of the distance of a run and a shape that do not cross, less the shape's radius,
+/// A lower bound of the distance of a run and a shape, 0 where they cross, less the shape's radius,
 /// m; the distance itself unless the shape is an ellipse. Sets the end of the run and the vertex of
 /// the shape that are nearest.
 double DistanceOfRun(const Outline& outline, int run, const Pose<double>& pose,
                      const ShapeView<double>& shape, const Pose<double>& shape_pose, int* corner,
                      int* vertex);
+
+/// Whether a vertex of a shape, less its radius, is more than `margin` (m) behind a run of a polygon
+/// and in its solid, with its foot on the run: another run may be nearer.
+bool IsInSolidBehind(const Outline& outline, int run, const Pose<double>& pose,
+                     const ShapeView<double>& shape, const Pose<double>& shape_pose, double margin);
 
 }  // namespace tangible

@@ -22,6 +22,7 @@
 #include "tangible/simulation/events/event_counts.h"
 #include "tangible/simulation/events/event_edges.h"
 #include "tangible/simulation/events/event_search.h"
+#include "tangible/simulation/events/load_speed.h"
 #include "tangible/simulation/events/segment_flow.h"
 #include "tangible/simulation/events/support_bounds.h"
 #include "tangible/simulation/events/tolerances.h"
@@ -55,6 +56,16 @@ bool BeginsInPenetration(const Model<double>& model, const Segment& segment) {
 double SlipOf(const Model<double>& model, const State<double>& state,
               const ActiveContact& contact) {
   return std::abs(SpeedsOf(model, state, contact).slip);
+}
+
+// Whether a contact at rest is accelerated in its direction of sliding as a motion starts, by more
+// than the rounding of what the loads and friction would give it.
+bool StartsToSlide(const Model<double>& model, const Segment& segment, size_t contact) {
+  const SolvedNode& start = segment.stages[0];
+  const double largest = LoadAcceleration(start.problem);
+  const double rate = SlipRate(model, segment.before, segment.time, segment.middle,
+                               start.solution.motion, segment.contacts[contact]);
+  return segment.length > 0.0 && SlidingSign(segment.modes[contact]) * rate > kNoRate * largest;
 }
 
 }  // namespace
@@ -262,7 +273,7 @@ bool RolloutCertifier::SlidesAtLimit(const Model<double>& model, ContactMode by_
   if (KeepsSide(model, slides, derivative, segment)) return false;
   const double slip =
       std::max(SlipOf(model, segment->before, slides), SlipOf(model, segment->after, slides));
-  return slip <= Negligible(model, slip);
+  return slip <= Negligible(model, slip) && !StartsToSlide(model, *segment, contact);
 }
 
 void RolloutCertifier::AddSegment(const Model<double>& model, long step,
@@ -574,7 +585,10 @@ void RolloutCertifier::AddIsland(const Model<double>& model, long step, EventDer
   for (const Graze& graze : grazes) {
     const Place place{model.structure.get(), step, graze.time, 0, &graze.contact,
                       ContactMode::kOpen};
-    AddMargin(graze.margin, place, graze.touches ? "grazing touch" : "grazing, no touch");
+    AddMargin(graze.margin, place,
+              graze.is_slip   ? (graze.touches ? "grazing end of sliding" : "grazing, slides on")
+              : graze.touches ? "grazing touch"
+                              : "grazing, no touch");
   }
 }
 

@@ -15,7 +15,7 @@ struct GapCourse {
 GapCourse CourseAt(const Model<double>& model, const State<double>& state,
                    const ActiveContact& contact) {
   ContactRows<double> rows;
-  EvaluateContactRows(model, state, contact, &rows);
+  EvaluateActiveRows(model, state, contact, &rows);
   return {rows.geometry.gap,
           RelativeSpeed(state, contact.a, rows.normal_a, contact.b, rows.normal_b)};
 }
@@ -39,11 +39,19 @@ double Least(const GapCourse& start, const GapCourse& end, double length) {
   return start.gap + s * (v0 + s * (0.5 * b + s * c / 3.0));
 }
 
+// Whether the pair has closed contacts, or the joint is at its limit.
 bool Closed(const Segment& segment, const ActiveContact& contact) {
-  return std::any_of(segment.contacts.begin(), segment.contacts.end(),
-                     [&](const ActiveContact& other) {
-                       return other.IsOfShapes() && other.a == contact.a && other.b == contact.b;
-                     });
+  return std::any_of(
+      segment.contacts.begin(), segment.contacts.end(), [&](const ActiveContact& other) {
+        return contact.IsOfShapes()
+                   ? other.IsOfShapes() && other.a == contact.a && other.b == contact.b
+                   : other.SameAs(contact);
+      });
+}
+
+// Whether the contact has a gap: shapes, or a joint and its limit.
+bool HasGap(const ActiveContact& contact) {
+  return contact.IsOfShapes() || !contact.IsPureFriction();
 }
 
 class GrazeFinder {
@@ -52,19 +60,21 @@ class GrazeFinder {
       : model_(model), search_(model), most_(most), grazes_(*grazes) {}
 
   void Add(const Segment& segment) {
-    if (segment.event == EventKind::kTouch && segment.event_contact.IsOfShapes() &&
+    if (segment.event == EventKind::kTouch && HasGap(segment.event_contact) &&
         !TakesOver(segment)) {
       AddTouch(segment);
     }
+    AddSlips(segment);
     const double reach = segment.length * FastestApproach(segment);
     if (!(reach > 0.0) || !std::isfinite(reach)) {
       return;
     }
     search_.FindContacts(model_, segment.after, reach, &near_);
+    AppendLimits(model_, segment.after, &near_);
     for (const ActiveContact& contact : near_) {
       const bool touches =
           segment.event == EventKind::kTouch && contact.SameAs(segment.event_contact);
-      if (contact.IsOfShapes() && !touches && !Closed(segment, contact)) {
+      if (!touches && !Closed(segment, contact)) {
         AddMiss(segment, contact);
       }
     }
@@ -137,6 +147,44 @@ class GrazeFinder {
     // A minimum just below 0 is rounding: the bodies did not touch.
     const double least = std::abs(Least(start, end, segment.length));
     List({least / height, 0.0, contact, false, least}, segment);
+  }
+
+  // A slip whose speed falls to 0, or nearly, and would rise again: friction that has stopped it
+  // must let go at once.
+  void AddSlips(const Segment& segment) {
+    if (!(segment.length > 0.0) || segment.num_stages == 0) return;
+    const double dt = model_.structure->settings.dt;
+    const double rest = std::max(search_.SpeedTolerance(model_, segment.before),
+                                 search_.SpeedTolerance(model_, segment.after));
+    for (size_t i = 0; i < segment.contacts.size(); ++i) {
+      const ActiveContact& contact = segment.contacts[i];
+      const double sign = SlidingSign(segment.modes[i]);
+      if (sign == 0.0) continue;
+      const auto speed = [&](const State<double>& state) {
+        return sign * SpeedsOf(model_, state, contact).slip;
+      };
+      const auto rate = [&](const State<double>& state, double time, int stage) {
+        return sign * SlipRate(model_, state, time, segment.middle,
+                               segment.stages[stage].solution.motion, contact);
+      };
+      // As of a gap, with speeds for heights and accelerations for speeds.
+      const GapCourse start{speed(segment.before), rate(segment.before, segment.time, 0)};
+      const GapCourse end{speed(segment.after), rate(segment.after, segment.time + segment.length,
+                                                     segment.num_stages - 1)};
+      if (!(start.gap > rest && start.speed < 0.0)) continue;
+      const double turns = (end.speed - start.speed) / segment.length;
+      const double fastest = std::max(std::abs(start.speed), turns * dt);
+      if (segment.event == EventKind::kSlipEnds && contact.SameAs(segment.event_contact)) {
+        if (!(turns > 0.0)) continue;
+        const double ratio = end.speed / fastest;
+        List({ratio * ratio, 0.0, contact, true, 0.5 * end.speed * end.speed / turns, true},
+             segment);
+      } else if (end.speed > 0.0) {
+        const double least = std::abs(Least(start, end, segment.length));
+        List({least / (0.5 * fastest * fastest / turns), 0.0, contact, false, least, true},
+             segment);
+      }
+    }
   }
 
   void List(Graze graze, const Segment& segment) {

@@ -2,8 +2,9 @@
 #pragma once
 //
 // How near the motion of an event step is to a grazing touch: a gap that turns around just above 0,
-// or that closes at hardly any speed. On the other side of the kink the derivative is of order
-// 1 / √distance.
+// or that closes at hardly any speed; of shapes, and of joints and their limits. On the other side
+// of the kink the derivative is of order 1 / √distance. The same of a slip whose speed hardly
+// reaches 0, or hardly does not.
 
 #include <vector>
 
@@ -12,7 +13,7 @@
 
 namespace tangible {
 
-/// A contact of shapes that nearly graze each other.
+/// A contact of shapes, or a joint and its limit, that nearly graze each other.
 struct Graze {
   double margin = 0.0;  ///< relative, like other margins: the change of data that is needed
   double time = 0.0;    ///< s
@@ -21,6 +22,7 @@ struct Graze {
   /// The height of a miss, or the depth to which bodies that touch would go without the contact, m;
   /// infinite where they would not turn around.
   double slack = 0.0;
+  bool is_slip = false;  ///< of a slip's speed, m/s for m
 };
 
 /// A touch at the end of a segment with ġ1 < 0, after ġ0 at its start: margin (ġ1 / v)², because

@@ -193,6 +193,8 @@ void ChoiceWatch::AddStep(const Model<double>& model, long step, Stepper* steppe
     FindGrazes(own, island.events, HUGE_VAL, &grazes);
     for (const Graze& graze : grazes) {
       if (!std::isfinite(graze.slack) || graze.time > end_) continue;
+      // The slips and limits of motions are choices of their own (AddSegment).
+      if (graze.is_slip || !graze.contact.IsOfShapes()) continue;
       const ActiveContact contact = island.InWhole(graze.contact);
       const ChoiceKind kind = graze.touches ? ChoiceKind::kGrazing : ChoiceKind::kMiss;
       const double size = std::max(RadiusOf(own, graze.contact.a), RadiusOf(own, graze.contact.b));

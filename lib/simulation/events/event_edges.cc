@@ -47,11 +47,27 @@ void ForEachWindowEdge(const ModelStructure& structure, const Visit& visit) {
 
 // Whether a signal's values before and from row k on differ.
 bool JumpsAt(const Signal& signal, size_t k) {
-  if (signal.interpolation != Signal::Interpolation::kConstant) return false;
+  if (k == 0 || signal.interpolation != Signal::Interpolation::kConstant) return false;
   const auto differs = [k](const std::vector<double>& column) {
     return k < column.size() && column[k - 1] != column[k];
   };
   return differs(signal.x) || differs(signal.y) || differs(signal.value);
+}
+
+// Calls visit(signal, row) for the rows of the signals of forces, joints and servos.
+template <typename Visit>
+void ForEachCorner(const ModelStructure& structure, const Visit& visit) {
+  const auto rows_of = [&](int index) {
+    if (index < 0) return;
+    const Signal& signal = structure.signals[index];
+    for (size_t k = 0; k < signal.time.size(); ++k) visit(signal, k);
+  };
+  for (const ForceIndex& force : structure.forces) {
+    rows_of(force.force_signal);
+    rows_of(force.torque_signal);
+  }
+  for (const JointIndex& joint : structure.joints) rows_of(joint.effort_signal);
+  for (const ServoIndex& servo : structure.servos) rows_of(servo.signal);
 }
 
 // Whether the edge is the end of a joint.
@@ -67,28 +83,17 @@ std::vector<Edge> EdgesWithin(const Model<double>& model, double from, double to
   std::vector<Edge> edges;
   const ModelStructure& structure = *model.structure;
   const double near = NearAStepsEnd(model);
-  const auto add = [&](double time, const WindowEdge& window) {
+  const auto add = [&](double time, const WindowEdge& window, bool steps) {
     if (time > from + near && time < to - near) {
-      edges.push_back({time, window});
+      edges.push_back({time, window, false, steps});
     }
   };
-  const auto add_signal = [&](int index) {
-    if (index >= 0) {
-      for (const double time : structure.signals[index].time) {
-        add(time, WindowEdge());
-      }
-    }
-  };
-  ForEachWindowEdge(
-      structure, [&](const WindowEdge& window) { add(model.parameters[window.number], window); });
-  for (const ForceIndex& force : structure.forces) {
-    add_signal(force.force_signal);
-    add_signal(force.torque_signal);
-  }
-  for (const JointIndex& joint : structure.joints) {
-    add_signal(joint.effort_signal);
-  }
-  for (const ServoIndex& servo : structure.servos) add_signal(servo.signal);
+  ForEachWindowEdge(structure, [&](const WindowEdge& window) {
+    add(model.parameters[window.number], window, false);
+  });
+  ForEachCorner(structure, [&](const Signal& signal, size_t k) {
+    add(signal.time[k], WindowEdge(), JumpsAt(signal, k));
+  });
   ForEachKnot(model, from, to, [&](const Edge& edge) {
     if (IsSameInstant(structure, edge.time, from) || IsSameInstant(structure, edge.time, to))
       return;
@@ -102,6 +107,7 @@ std::vector<Edge> EdgesWithin(const Model<double>& model, double from, double to
 void EdgeGroup::Add(const Edge& edge) {
   time = any ? std::min(time, edge.time) : edge.time;
   any = true;
+  steps = steps || edge.steps;
   if (edge.window.number < 0) return;
   if (window.number < 0 || (gives_way && !edge.gives_way)) {
     window = edge.window;
@@ -111,6 +117,12 @@ void EdgeGroup::Add(const Edge& edge) {
   }
 }
 
+void EdgeGroup::PutStepsFirst() {
+  if (!steps || window.force < 0) return;
+  further.insert(further.begin(), window);
+  window = WindowEdge();
+}
+
 EdgeGroup NextEdges(const std::vector<Edge>& edges, double now, double rounding) {
   EdgeGroup group;
   for (const Edge& edge : edges) {
@@ -118,6 +130,7 @@ EdgeGroup NextEdges(const std::vector<Edge>& edges, double now, double rounding)
     if (group.any && edge.time > group.time + rounding) break;
     group.Add(edge);
   }
+  group.PutStepsFirst();
   return group;
 }
 
@@ -129,6 +142,12 @@ EdgeGroup EdgesAt(const Model<double>& model, double time) {
     if (std::abs(edge - time) <= near) group.Add({edge, window});
   });
   const ModelStructure& s = *model.structure;
+  if (group.any && !s.signals.empty()) {
+    ForEachCorner(s, [&](const Signal& signal, size_t k) {
+      group.steps = group.steps || (std::abs(signal.time[k] - time) <= near && JumpsAt(signal, k));
+    });
+    group.PutStepsFirst();
+  }
   if (s.paths.empty()) return group;
   ForEachKnot(model, BesideInstant(s, time, PathSide::kBefore),
               BesideInstant(s, time, PathSide::kAfter), [&](const Edge& edge) {

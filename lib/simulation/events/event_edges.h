@@ -15,7 +15,8 @@
 // derivatives of both sides differ, and no segment is added. Where several windows' edges s₁ ≤ s₂ …
 // fall on one instant, there is a segment of zero length between each two of them, with the modes
 // that contacts have between them (AddFurtherEdges). If another order gives other accelerations the
-// derivative differs on each side, and the segment names the edge at its start.
+// derivative differs on each side, and the segment names the edge at its start. A step of a signal
+// at that instant, whose time is given, comes before them.
 //
 // A joint that ends is released at the edge (model_releases.h): twists go on, and accelerations
 // jump. Where the edge of a window or of another joint is at the same instant, the derivatives
@@ -39,6 +40,7 @@ struct Edge {
   double time;
   WindowEdge window;       ///< window.number −1: a corner of a signal
   bool gives_way = false;  ///< a knot at which no rate jumps
+  bool steps = false;      ///< a corner at which the signal's value jumps
 };
 
 /// The edges within (from, to), in their order; those next to an end of the step do not count.
@@ -51,8 +53,12 @@ struct EdgeGroup {
   WindowEdge window;  ///< the first whose time is a parameter
   std::vector<WindowEdge> further;
   bool gives_way = true;  ///< whether `window` is a knot at which no rate jumps
+  bool steps = false;     ///< whether a signal's value jumps
 
   void Add(const Edge& edge);
+  /// Where a signal's value jumps beside a window's edge, that given time comes first: it must not
+  /// move with the window's.
+  void PutStepsFirst();
 };
 
 /// The first edge after `now` of a sorted list, with those at its instant.

@@ -23,6 +23,7 @@
 #include "tangible/dynamics/model/driven_bodies.h"
 #include "tangible/lcp/system/contact_residual.h"
 #include "tangible/simulation/events/event_step.h"
+#include "tangible/simulation/events/load_speed.h"
 #include "tangible/simulation/events/tolerances.h"
 
 namespace tangible {
@@ -74,14 +75,10 @@ bool SlidesFreely(const ModelStructure& structure, const Impulses& impact, size_
 // The largest acceleration that loads alone give a body, of points m/s² and at the distance of a
 // radius of gyration rad/s², for each component: what friction cancels leaves their rounding.
 std::vector<double> FreeAccelerations(const ContactProblem<double>& problem) {
-  double fastest = 0.0;
+  const double fastest = LoadAcceleration(problem);
   const auto arm = [&](size_t k) {
     return std::sqrt(problem.mass[3 * k + 2] / problem.mass[3 * k]);
   };
-  for (size_t i = 0; i < problem.load.size(); ++i) {
-    const double acceleration = std::abs(problem.load[i]) / problem.mass[i];
-    fastest = std::max(fastest, i % 3 == 2 ? arm(i / 3) * acceleration : acceleration);
-  }
   std::vector<double> of_components;
   for (size_t i = 0; i < problem.load.size(); ++i) {
     of_components.push_back(i % 3 == 2 ? fastest / arm(i / 3) : fastest);
@@ -149,19 +146,55 @@ bool EventStepper::FollowAfter(const Model<double>& model, double now, State<dou
   if (guess_.starts || !JumpPullsJoint(model, now)) return true;
   // Joints follow a jump by the impulse that restores them; contacts that it makes approach have an
   // impact after it.
-  Segment pulled;
-  pulled.time = now;
-  pulled.middle = inside_;
-  EventPart* part = record_.Add();
-  part->is_impulses = true;
-  SetUpProjection(pulled, *state, &part->impulses);
-  if (!flow_.Project(model, &part->impulses)) {
+  if (!ProjectOntoJoints(model, now, state)) {
     outcome->message = "twists of joints whose body's path jumps";
     return false;
   }
   ++outcome->events;
+  return true;
+}
+
+bool EventStepper::ProjectOntoJoints(const Model<double>& model, double now, State<double>* state) {
+  Segment joints;
+  joints.time = now;
+  joints.middle = inside_;
+  EventPart* part = record_.Add();
+  part->is_impulses = true;
+  SetUpProjection(joints, *state, &part->impulses);
+  if (!flow_.Project(model, &part->impulses)) return false;
   SpreadTwists(*model.structure, part->impulses.solution.motion, &state->twist);
   part->impulses.new_twist = state->twist;
+  return true;
+}
+
+// Friction in a joint holds what does not turn; whether a joint turns is told by twists that the
+// joints allow.
+bool EventStepper::TurnJoints(const Model<double>& model, double now, State<double>* state,
+                              StepReport* outcome) {
+  FindTouching(model, *state);
+  const double slow = SlowSpeed(model, *state);
+  const State<double> given = *state;
+  const auto rests = [&](const State<double>& at, const ActiveContact& contact) {
+    return contact.IsJointFriction() && std::abs(SpeedsOf(model, at, contact).slip) <= slow;
+  };
+  const auto any = [&](const auto& is_one) {
+    return std::any_of(touching_.contacts.begin(), touching_.contacts.end(), is_one);
+  };
+  if (!any([&](const ActiveContact& contact) { return rests(given, contact); })) return true;
+  const int parts = record_.num_parts;
+  if (!ProjectOntoJoints(model, now, state)) {
+    outcome->message = "twists of joints as the run starts";
+    return false;
+  }
+  const bool turn = any([&](const ActiveContact& contact) {
+    return rests(given, contact) && !rests(*state, contact);
+  });
+  if (turn) {
+    FindTouching(model, *state);
+  } else {
+    record_.num_parts = parts;
+    *state = given;
+  }
   return true;
 }
 
@@ -242,22 +275,27 @@ void EventStepper::AddFurtherEdges(const Model<double>& model, double t, const E
       return few;
     };
     // Where a contact changes its mode between the edges the motion depends on their order.
-    const std::vector<double> none = accelerations(with({last, *next}));
-    const std::vector<double> other = accelerations(with({last}));
-    const std::vector<double> both = accelerations(rest);
+    std::vector<double> none, other, both;
+    if (last.number >= 0) {
+      none = accelerations(with({last, *next}));
+      other = accelerations(with({last}));
+      both = accelerations(rest);
+    }
     Segment* segment = AddEdge(model, t, after, with({*next}), state, outcome);
-    if (segment == nullptr || none.empty() || other.empty() || both.empty()) return;
+    if (segment == nullptr) return;
     segment->event_number = next->number;
+    const int before = std::exchange(last, *next).number;
+    if (before < 0) continue;
+    if (none.empty() || other.empty() || both.empty()) return;
     const std::vector<double>& one = segment->stages[0].solution.motion;
     const std::vector<double> free = FreeAccelerations(segment->stages[0].problem);
     for (size_t i = 0; i < one.size(); ++i) {
       const double size = std::max(
           {std::abs(none[i]), std::abs(one[i]), std::abs(other[i]), std::abs(both[i]), free[i]});
       if (std::abs(none[i] - one[i] - other[i] + both[i]) > kNoRate * size) {
-        segment->edge_before = last.number;
+        segment->edge_before = before;
       }
     }
-    last = *next;
   }
   HoldBehindEdges(model, t, after, first, state, outcome);
 }
@@ -511,10 +549,11 @@ bool EventStepper::LocateTouch(const Model<double>& model, double t, double slow
                                State<double>* state, StepReport* outcome) {
   if (record_.num_parts > 0) {
     const EventPart& last = *record_.parts[record_.num_parts - 1];
-    if (last.is_impulses
-            ? !impacts_.any_struck()
-            : last.segment.event != EventKind::kStepEnd && last.segment.event != EventKind::kEdge &&
-                  impacts_.Of(last.segment.event_contact) == group) {
+    const EventKind event = last.segment.event;
+    if (last.is_impulses ? !impacts_.any_struck()
+                         : (event == EventKind::kTouch || event == EventKind::kReturn ||
+                            event == EventKind::kAtOnce) &&
+                               impacts_.Of(last.segment.event_contact) == group) {
       return true;
     }
   }

@@ -254,39 +254,59 @@ bool EventSearch::IsDetermined(const Event& event, SolvedNode* node) const {
          kDetermined;
 }
 
-// A force that is 0, or friction that is at its limit, as the motion starts. Where it goes beyond
-// in all of the motion the mode ends at the start, which its value there cannot tell.
+// A function that is 0 as the motion starts: a normal force, friction that is at its limit, or the
+// speed of a contact that begins to slide. Where it is positive for a while and negative later the
+// mode ends between; where it is negative in all of the motion the mode ends at the start, which
+// its value there cannot tell.
 void EventSearch::TryStart(const Model<double>& model, double tolerance, Event trial,
                            Event* event) {
-  if (trial.kind == EventKind::kSlipEnds || keeps_starts_) return;
-  // The last stage tells it for nearly all contacts that stay at their limit.
-  const Segment& motion = At(model, event->length)->motion;
-  const ContactSolution<double>& late = motion.stages[motion.num_stages - 1].solution;
-  const double last =
-      trial.kind == EventKind::kLiftOff
-          ? late.normal_impulse[trial.index]
-          : motion.FrictionLeft(trial.index, motion.friction[trial.index].value, trial.sign, late);
-  if (motion.num_stages > 1 && !(last < -tolerance)) return;
-  // A solve, before the motions that follow: in a pile the share of a contact is often redundant.
-  if (!IsDetermined(trial, &At(model, event->length)->motion.stages[0])) return;
+  const bool is_slip = trial.kind == EventKind::kSlipEnds;
+  if (keeps_starts_) return;
+  const double length = event->length;
+  if (!is_slip) {
+    // The last stage tells it for nearly all contacts that stay at their limit.
+    const Segment& motion = At(model, length)->motion;
+    const ContactSolution<double>& late = motion.stages[motion.num_stages - 1].solution;
+    const double last = trial.kind == EventKind::kLiftOff
+                            ? late.normal_impulse[trial.index]
+                            : motion.FrictionLeft(trial.index, motion.friction[trial.index].value,
+                                                  trial.sign, late);
+    if (motion.num_stages > 1 && !(last < -tolerance)) return;
+    // A solve, before the motions that follow: in a pile the share of a contact is often redundant.
+    if (!IsDetermined(trial, &At(model, length)->motion.stages[0])) return;
+  }
+  // Where bodies jam they are thrown about by much more than their loads, in motions that are given
+  // up.
+  const double loads = LoadAcceleration(At(model, length)->motion.stages[0].problem);
   double at_end = 0.0, value = 0.0;
+  double beyond = length, f_beyond = 0.0;  // the earliest place where the function is negative
   for (const double share : {1.0, 0.5, 0.125, 0x1p-6, 0x1p-9}) {
-    value = ModeValue(model, At(model, share * event->length), trial);
-    if (!(value < (share > 0.1 ? -tolerance : tolerance))) return;
-    at_end = share == 1.0 ? value : at_end;
+    const double at = share * length;
+    value = ModeValue(model, At(model, at), trial);
+    if (std::isnan(value) || (share == 1.0 && !(value < -tolerance))) return;
+    const double back = is_slip ? -value / (loads * at) : 0.0;
+    if (back > kJams || (is_slip && share == 1.0 && back < kLeastBack)) return;
+    if (value > tolerance) {
+      const auto f = [&](Sample& sample) { return ModeValue(model, &sample, trial); };
+      trial.length = Refine(model, f, kLocatedOfSize * value, at, value, beyond, f_beyond);
+      *event = trial;
+      return;
+    }
+    if (share == 1.0) at_end = value;
+    if (value < -tolerance) {
+      beyond = at;
+      f_beyond = value;
+    }
   }
   // A value that jumps at the start is rounding of bodies whose masses are far apart.
   if (value < 0.5 * at_end) return;
   trial.at_start = true;
-  trial.length = event->length;
+  trial.length = length;
   *event = trial;
 }
 
-// The rate of a sliding speed in its friction's direction where bodies have given accelerations,
-// without what turning directions add.
-double EventSearch::SlipRate(const Model<double>& model, const State<double>& state, double time,
-                             const std::vector<double>& accelerations, const Event& event) const {
-  const ActiveContact& contact = segment_->contacts[event.index];
+double SlipRate(const Model<double>& model, const State<double>& state, double time, double inside,
+                const std::vector<double>& accelerations, const ActiveContact& contact) {
   ContactRows<double> rows;
   EvaluateActiveRows(model, state, contact, &rows);
   double rate = 0.0;
@@ -298,13 +318,20 @@ double EventSearch::SlipRate(const Model<double>& model, const State<double>& st
   add(contact.b, rows.tangent_b);
   if (!model.structure->paths.empty()) {
     std::vector<double> given;
-    GivenAccelerations(model, time, segment_->middle, &given);
+    GivenAccelerations(model, time, inside, &given);
     for (int i = 0; i < 3; ++i) {
       rate += rows.tangent_a[i] * given[3 * contact.a + i] +
               rows.tangent_b[i] * given[3 * contact.b + i];
     }
   }
-  return SlidingSign(segment_->modes[event.index]) * rate;
+  return rate;
+}
+
+double EventSearch::RateOfSlip(const Model<double>& model, const State<double>& state, double time,
+                               const std::vector<double>& accelerations, const Event& event) const {
+  return SlidingSign(segment_->modes[event.index]) * SlipRate(model, state, time, segment_->middle,
+                                                              accelerations,
+                                                              segment_->contacts[event.index]);
 }
 
 // Where a sliding speed that is positive at a and b falls below 0 between them, or may do so, by
@@ -316,13 +343,13 @@ double EventSearch::FindDip(const Model<double>& model, const Event& event, doub
   // The last stage is evaluated at the end of its motion.
   const auto rate_at_end = [&](double length) {
     const Segment& motion = At(model, length)->motion;
-    return width * SlipRate(model, motion.after, segment_->time + length,
-                            motion.stages[motion.num_stages - 1].solution.motion, event);
+    return width * RateOfSlip(model, motion.after, segment_->time + length,
+                              motion.stages[motion.num_stages - 1].solution.motion, event);
   };
   const double ra = a > 0.0
                         ? rate_at_end(a)
-                        : width * SlipRate(model, segment_->before, segment_->time,
-                                           At(model, b)->motion.stages[0].solution.motion, event);
+                        : width * RateOfSlip(model, segment_->before, segment_->time,
+                                             At(model, b)->motion.stages[0].solution.motion, event);
   if (!(ra < 0.0)) return b;
   const double rb = rate_at_end(b);
   if (!(rb > 0.0)) return b;
@@ -381,10 +408,10 @@ bool EventSearch::IsClearOfHalf(const Model<double>& model, const Event& trial, 
   double at_end = 0.0, half = 0.0;
   if (trial.kind == EventKind::kSlipEnds) {
     at_end = ModeValue(model, sample, trial);
-    const double rate_a =
-        SlipRate(model, segment_->before, segment_->time, motion.stages[0].solution.motion, trial);
+    const double rate_a = RateOfSlip(model, segment_->before, segment_->time,
+                                     motion.stages[0].solution.motion, trial);
     const double rate_b =
-        SlipRate(model, motion.after, segment_->time + length, late.motion, trial);
+        RateOfSlip(model, motion.after, segment_->time + length, late.motion, trial);
     half = 0.5 * (at_start + at_end) + 0.125 * length * (rate_a - rate_b);
   } else {
     // The third stage is at half of the motion.

@@ -34,6 +34,12 @@ inline double LargestSpeedBetween(double before, double after) {
   return 1.02 * std::max(before, after) + 0.25 * std::abs(after - before);
 }
 
+/// The rate t·a of a contact's sliding speed, m/s², where moving bodies have given accelerations
+/// and driven ones those of their paths at `time`, on the piece that `inside` tells; without what
+/// turning directions add.
+double SlipRate(const Model<double>& model, const State<double>& state, double time, double inside,
+                const std::vector<double>& accelerations, const ActiveContact& contact);
+
 class EventSearch {
  public:
   explicit EventSearch(const Model<double>& model);
@@ -53,7 +59,7 @@ class EventSearch {
 
   /// Whether the last search has found that the segment's event_contact does not keep its mode: its
   /// normal force is 0 at the start (kLiftOff), or its friction at the limit (kSlipBegins), and
-  /// would go on beyond.
+  /// would go on beyond; or a contact that begins to slide would slide backwards (kSlipEnds).
   bool ends_at_start() const { return ends_at_start_; }
   /// Whether the next search keeps the modes of such contacts.
   void KeepStarts(bool keeps) { keeps_starts_ = keeps; }
@@ -147,8 +153,9 @@ class EventSearch {
   const double* HeldAt(const Model<double>& model, int support, Sample* sample);
   SupportState LetsGoAt(const Model<double>& model, const State<double>& state, int support,
                         const double* held);
-  double SlipRate(const Model<double>& model, const State<double>& state, double time,
-                  const std::vector<double>& accelerations, const Event& event) const;
+  /// SlipRate of an event's contact in its direction of sliding.
+  double RateOfSlip(const Model<double>& model, const State<double>& state, double time,
+                    const std::vector<double>& accelerations, const Event& event) const;
   double FindDip(const Model<double>& model, const Event& event, double a, double fa, double b,
                  double fb);
   bool IsDetermined(const Event& event, SolvedNode* node) const;

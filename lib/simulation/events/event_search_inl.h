@@ -225,6 +225,18 @@ bool EventSearch::FirstRoot(const Model<double>& model, const Gap& gap, const Ra
   const bool by_rates = segment_->contacts.size() >= kLeastContactsByRates;
   std::vector<Interval> open = {{from, first, to, gap(*At(model, to))}};
   Interval crossing = open.back();  // the shortest known to hold a crossing
+  // Whether the root within an interval is found: not where the gap is infinite on the way, behind
+  // which another crossing may be found.
+  const auto refines = [&](const Interval& in) {
+    bool is_known = true;
+    const auto value = [&](const Sample& sample) {
+      const double at = gap(sample);
+      is_known = is_known && !std::isinf(at);
+      return at;
+    };
+    *root = Refine(model, value, tolerance, in.a, in.fa, in.b, in.fb);
+    return is_known || std::isinf(in.fa) || in.b - in.a <= smallest;
+  };
   for (int k = 0; !open.empty(); ++k) {
     const Interval i = open.back();
     open.pop_back();
@@ -238,7 +250,10 @@ bool EventSearch::FirstRoot(const Model<double>& model, const Gap& gap, const Ra
       continue;
     }
     const double reach = i.b - i.a > smallest ? rate_over(i.a, i.b) * (i.b - i.a) : 0.0;
-    if (i.fb > 0.0 && (i.fa + i.fb > reach || i.b - i.a <= smallest)) {
+    // A gap that is infinite at one end alone, as of a body that is behind a run of an outline there,
+    // may close as soon as the other end's allows.
+    const double least = std::isinf(i.fa) != std::isinf(i.fb) ? std::min(i.fa, i.fb) : i.fa + i.fb;
+    if (i.fb > 0.0 && (least > reach || i.b - i.a <= smallest)) {
       continue;
     }
     const KnownCourse known = course_over(i.a, i.fa, i.b, i.fb);
@@ -248,18 +263,16 @@ bool EventSearch::FirstRoot(const Model<double>& model, const Gap& gap, const Ra
     if (known.course == Course::kOneRoot) {
       Interval in = i;
       const auto value = [&](double at) { return gap(*At(model, at)); };
-      if (!(by_rates && i.fb < 0.0 && std::isfinite(known.rate_a) &&
-            NarrowByRates(value, known, tolerance, &in.a, &in.fa, &in.b, &in.fb, root))) {
-        *root = Refine(model, gap, tolerance, in.a, in.fa, in.b, in.fb);
+      if (by_rates && i.fb < 0.0 && std::isfinite(known.rate_a) &&
+          NarrowByRates(value, known, tolerance, &in.a, &in.fa, &in.b, &in.fb, root)) {
+        return true;
       }
-      return true;
+      if (refines(in)) return true;
     }
     // Where the gap closes by more than half of what the bound allows it does not open in between:
     // the crossing is the first.
-    if (i.fb <= 0.0 && (i.b - i.a <= smallest || i.fa - i.fb > 0.5 * reach)) {
-      *root = Refine(model, gap, tolerance, i.a, i.fa, i.b, i.fb);
-      return true;
-    }
+    const bool is_first = i.b - i.a <= smallest || i.fa - i.fb > 0.5 * reach;
+    if (i.fb <= 0.0 && is_first && refines(i)) return true;
     const double m = 0.5 * (i.a + i.b);
     const double fm = gap(*At(model, m));
     if (fm > 0.0) {

@@ -50,6 +50,9 @@ ActiveContact NextAt(const Model<double>& model, const State<double>& state,
   return next;
 }
 
+// Of a run's gap: an end that is nearer by less is the vertex over the run.
+constexpr double kNearerEnd = 0.001;
+
 // The closest features of a pair.
 struct Features {
   ContactFeature of[2];
@@ -77,6 +80,8 @@ class EventSearch::PairSearch {
         located_(search->GapTolerance(segment_.before, a, b)),
         closed_(std::any_of(segment_.contacts.begin(), segment_.contacts.end(),
                             [&](const ActiveContact& c) { return IsOfPair(c); })),
+        touches_(std::any_of(touching_.begin(), touching_.end(),
+                             [&](const ActiveContact& c) { return IsOfPair(c); })),
         outline_a_(model.OutlineOf(a, parts.a)),
         outline_b_(model.OutlineOf(b, parts.b)),
         curve_a_(model.CurveOf(a, parts.a)),
@@ -151,6 +156,10 @@ class EventSearch::PairSearch {
   double HiddenRunGap(const State<double>& state, ActiveContact contact);
   // The same for a spline.
   double HiddenCurveGap(const State<double>& state, ActiveContact contact);
+  // Whether a vertex of the other body is in the solid behind the run.
+  bool IsInRun(const State<double>& state) const;
+  // The gap of a run with features over it.
+  double GapOfRun(const State<double>& state, double of_features);
   // Makes a contact the nearest.
   void TakeNearest(const ActiveContact& contact, const ContactGeometry<double>& geometry);
   // The smallest gap of the contacts that count; sets nearest_.
@@ -191,6 +200,7 @@ class EventSearch::PairSearch {
   const double touch_;    ///< gap below which the pair touches, m
   const double located_;  ///< tolerance of the location of the pair's gaps, m
   const bool closed_;     ///< the pair has closed contacts
+  const bool touches_;    ///< it touches as the segment starts
   ActiveContact nearest_;
   Vector2<double> normal_{0.0, 0.0};
   bool on_face_ = false;  ///< the normal is a face's, not that of the line between two points
@@ -363,7 +373,45 @@ double EventSearch::PairSearch::Gap(const Sample& sample, Counts counts, bool ha
       TakeNearest(contact, rows.geometry);
     }
   }
-  return features.count == 0 && may_hide_ ? HiddenGap(state) : smallest;
+  if (features.count == 0) return may_hide_ ? HiddenGap(state) : smallest;
+  return outline_a_ != nullptr || outline_b_ != nullptr ? GapOfRun(state, smallest) : smallest;
+}
+
+bool EventSearch::PairSearch::IsInRun(const State<double>& state) const {
+  const auto is_in = [&](const Outline* outline, int body, int part, int other, int other_part) {
+    return outline != nullptr &&
+           IsInSolidBehind(*outline, model_.structure->bodies[body].RunOfPart(part),
+                           state.PoseOf(body), model_.Shape(other, other_part), state.PoseOf(other),
+                           kDeepTouches * touch_);
+  };
+  if (outline_a_ != nullptr && outline_b_ != nullptr) return false;
+  return is_in(outline_a_, a_, parts_.a, b_, parts_.b) ||
+         is_in(outline_b_, b_, parts_.b, a_, parts_.a);
+}
+
+// The features of a run are those over it. The body may be nearer to one of its ends, or cross it
+// elsewhere, where another run is nearer: then its gap is unknown, as it is behind the run. Of a
+// body that touches the run elsewhere the distance tells nothing, but a corner in the solid does.
+double EventSearch::PairSearch::GapOfRun(const State<double>& state, double of_features) {
+  if (!std::isfinite(of_features) || !(of_features > touch_)) return of_features;
+  if (touches_ || !may_hide_) return IsInRun(state) ? kInfinity : of_features;
+  const ActiveContact nearest = nearest_;
+  const Vector2<double> normal = normal_;
+  const bool on_face = on_face_;
+  ActiveContact contact;
+  contact.a = a_;
+  contact.b = b_;
+  const double gap = HiddenRunGap(state, contact);
+  const auto is_ellipse = [&](int body, int part) {
+    return model_.Shape(body, part).type == ShapeType::kEllipse;
+  };
+  // Of an ellipse the distance is only a bound.
+  const bool is_bound = is_ellipse(a_, parts_.a) || is_ellipse(b_, parts_.b);
+  if (std::isinf(gap) || (!is_bound && gap < (1.0 - kNearerEnd) * of_features)) return gap;
+  nearest_ = nearest;
+  normal_ = normal;
+  on_face_ = on_face;
+  return of_features;
 }
 
 // The bound is the speed of all points; where both ends have the same face, the speed along its

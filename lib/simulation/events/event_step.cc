@@ -376,7 +376,12 @@ double EventStepper::SlipAtStart(size_t i, double slow, bool* is_open) const {
 }
 
 bool EventStepper::Releases(const Model<double>& model, const Segment& segment) {
-  if (search_.ends_at_start()) {
+  if (search_.ends_at_start() && segment.event == EventKind::kSlipEnds) {
+    // It would slide backwards at once: what moves it has only just reached its limit.
+    released_.clear();
+    resting_.push_back(segment.event_contact);
+    SwitchMode(segment);
+  } else if (search_.ends_at_start()) {
     const bool opens = segment.event == EventKind::kLiftOff;
     for (const ActiveContact& contact : segment.contacts) {
       if (opens ? contact.SameAs(segment.event_contact)
@@ -455,6 +460,14 @@ bool EventStepper::ChooseContactModes(const Model<double>& model, double slow,
     if (SlidingSign(solution.modes[i]) != 0.0 && std::abs(slip[i]) <= slow) {
       inner_impulses_.Choose(problem, kDegenerateTolerance, &solution);
       break;
+    }
+  }
+  for (size_t i = 0; i < slip.size(); ++i) {
+    const bool rests = std::any_of(
+        resting_.begin(), resting_.end(),
+        [&](const ActiveContact& contact) { return contact.SameAs(segment->contacts[i]); });
+    if (rests && SlidingSign(solution.modes[i]) != 0.0 && std::abs(slip[i]) <= slow) {
+      solution.modes[i] = ContactMode::kSticking;
     }
   }
   guess_.contacts = segment->contacts;
@@ -577,6 +590,7 @@ bool EventStepper::SolveInstant(const Model<double>& model, double now, double h
   if (!SolveImpacts(model, now, state, outcome)) {
     return false;
   }
+  if (guess_.starts && !TurnJoints(model, now, state, outcome)) return false;
   if ((guess_.starts || at_end) &&
       !AddInstant(model, now, EventKind::kStepEnd, nullptr, state, outcome)) {
     return false;
@@ -706,6 +720,7 @@ StepReport EventStepper::Advance(const Model<double>& model, double t, double h,
   record_.Clear();
   guess_.located = 0;
   released_.clear();
+  resting_.clear();
   limited_ = false;
   counts_.Clear();
   shortened_.Clear();
@@ -748,6 +763,7 @@ StepReport EventStepper::Advance(const Model<double>& model, double t, double h,
     tries.short_step = false;
     tries.held = false;
     tries.unsolved.clear();
+    resting_.clear();
     guess_.located += IsLocated(segment.event) ? 1 : 0;
     outcome.stopped = at_event == AtEvent::kStopAtSecond && guess_.located > 1;
     if (outcome.stopped) break;

@@ -146,6 +146,12 @@ class EventStepper {
   /// bodies that joints hold to them along.
   bool FollowAfter(const Model<double>& model, double now, State<double>* state,
                    StepReport* outcome);
+  /// Twists that the joints allow, by an impulse as a new part of the record.
+  bool ProjectOntoJoints(const Model<double>& model, double now, State<double>* state);
+  /// At a run's start: where the initial twists turn a joint with friction alone by the joints'
+  /// impulses, these come first.
+  bool TurnJoints(const Model<double>& model, double now, State<double>* state,
+                  StepReport* outcome);
   Segment& BeginSegment(double now, double until, const State<double>& state);
   /// What has been tried to go on in a step. Where contacts nearly jam accelerations change so fast
   /// with poses that only a short motion can be integrated: it is halved.
@@ -244,7 +250,8 @@ class EventStepper {
   /// Where the last segment's event ends it at its start (EventSearch::ends_at_start): takes it
   /// back and releases the event's contact, with its like (SwitchMode), in the next one. Takes a
   /// segment back too in which a released contact closes or slides the other way (contacts that
-  /// jam): then none is released. Whether it has taken the segment back.
+  /// jam): then none is released. A slip that ends at its start (kSlipEnds) does not begin. Whether
+  /// it has taken the segment back.
   bool Releases(const Model<double>& model, const Segment& segment);
   /// The slip with which contact i of touching_ counts, and whether it may be closed.
   double SlipAtStart(size_t i, double slow, bool* is_open) const;
@@ -281,6 +288,8 @@ class EventStepper {
   /// Contacts at their limit as the next motion starts, beyond which they would go in it: the
   /// accelerations at the start do not tell that they slide or open.
   std::vector<EndingSlip> released_;
+  /// Contacts at rest that would slide backwards in the next motion as soon as they slide.
+  std::vector<ActiveContact> resting_;
 };
 
 }  // namespace tangible

@@ -163,6 +163,17 @@ double LoadSpeed(const Model<double>& model, const Lengths& lengths, double t, d
   return LoadScan(model, lengths, t, h, state).Run();
 }
 
+double LoadAcceleration(const ContactProblem<double>& problem) {
+  double fastest = 0.0;
+  for (size_t i = 0; i < problem.load.size(); ++i) {
+    const double acceleration = std::abs(problem.load[i]) / problem.mass[i];
+    const size_t k = 3 * (i / 3);
+    const double arm = i % 3 == 2 ? std::sqrt(problem.mass[k + 2] / problem.mass[k]) : 1.0;
+    fastest = std::max(fastest, arm * acceleration);
+  }
+  return fastest;
+}
+
 double LimitAcceleration(const ContactProblem<double>& problem) {
   double largest = 0.0;
   for (const ContactBlock<double>& contact : problem.contacts) {

@@ -16,6 +16,10 @@ namespace tangible {
 double LoadSpeed(const Model<double>& model, const Lengths& lengths, double t, double h,
                  const State<double>& state);
 
+/// The largest acceleration that loads alone give a body, m/s², of points at the distance of its
+/// radius of gyration.
+double LoadAcceleration(const ContactProblem<double>& problem);
+
 /// The largest acceleration (m/s² or rad/s²) that friction of joints at its limit gives by itself,
 /// of a problem of accelerations.
 double LimitAcceleration(const ContactProblem<double>& problem);

@@ -117,6 +117,12 @@ inline constexpr double kNoScale = 1e-300;
 /// Of the forces at work: a force that is negative by more counts as negative, and friction that
 /// exceeds its limit by more as exceeded.
 inline constexpr double kForceTolerance = 1e-10;
+/// Of the acceleration that loads alone give a body: what is accelerated more, from rest and
+/// backwards, is thrown about between others that jam.
+inline constexpr double kJams = 1e3;
+/// Of the same: a slip from rest that goes backwards more slowly is what rounding leaves of bodies
+/// that jam.
+inline constexpr double kLeastBack = 1e-5;
 /// Relative residual of a transposed solve: a force at which rows leave no more is determined by
 /// them, while the share of a redundant contact leaves a part of order 1.
 inline constexpr double kDetermined = 1e-6;

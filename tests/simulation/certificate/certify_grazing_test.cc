@@ -47,6 +47,68 @@ TEST(CertifyGrazingTest, AThrowThatJustReachesTheCeilingIsNearAKink) {
   }
 }
 
+Certificate CertificateOf(const Scene& scene) {
+  Model<double> model;
+  State<double> initial;
+  BuildModel(scene, &model, &initial);
+  return CertifyRollout(model, initial);
+}
+
+// By 1e-10 and by 1e-2, up and down: near a kink, and another motion.
+template <typename SceneWith>
+void ExpectGrazing(const SceneWith& scene_with, double far) {
+  for (const double dt : {1.0 / 128.0, 1.0 / 100.0, 0.25}) {
+    for (const double off : {0.0, 1e-10, -1e-10}) {
+      Scene scene = scene_with(off);
+      scene.simulation.dt = dt;
+      const Certificate c = CertificateOf(scene);
+      EXPECT_EQ(c.verdict.find("near a kink: "), 0u) << off << " " << dt << " " << c.verdict;
+      EXPECT_NE(c.margin_where.find("grazing"), std::string::npos) << c.margin_where;
+    }
+    for (const double off : {far, -far}) {
+      Scene scene = scene_with(off);
+      scene.simulation.dt = dt;
+      EXPECT_EQ(CertificateOf(scene).verdict, "trustworthy") << off << " " << dt;
+    }
+  }
+}
+
+// The same throw, of a slider that meets its limit.
+TEST(CertifyGrazingTest, ASliderThatJustReachesItsLimitIsNearAKink) {
+  const auto scene_with = [](double higher) {
+    Scene scene = test_scenes::SceneOf(R"({"gravity": [0, -8], "bodies": [
+        {"name": "b", "mass": 1, "inertia": 1, "position": [0, 0], "velocity": [0, 0.25]}],
+      "joints": [{"name": "j", "type": "prismatic", "bodies": ["b", "world"], "anchor": [0, 0],
+                  "axis": [0, 1], "limits": [-9, 1], "restitution": 1}],
+      "simulation": {"duration": 0.0625, "stepping": "event"}})");
+    scene.joints[0].limits->second = 1.0 / 256.0 + higher;
+    return scene;
+  };
+  ExpectGrazing(scene_with, 1e-4);
+}
+
+// v = v0 − 2 t + 4 t² falls to v0 − 1/4 after 1/4 s.
+TEST(CertifyGrazingTest, ABlockThatNearlyStopsIsNearAKink) {
+  const auto scene_with = [](double faster) {
+    Scene scene = test_scenes::SceneOf(R"({"gravity": [0, -10], "bodies": [
+        {"name": "b", "shape": {"box": {"size": [0.2, 0.1]}}, "mass": 1, "position": [0, 0.05],
+         "velocity": [0.25, 0], "friction": 0.5},
+        {"name": "floor", "static": true, "friction": 0.5,
+         "shape": {"half_plane": {"normal": [0, 1]}}}],
+      "forces": [{"name": "f", "body": "b", "force": [0, 0]}],
+      "simulation": {"duration": 0.5, "stepping": "event"}})");
+    Signal load;
+    load.interpolation = Signal::Interpolation::kLinear;
+    load.time = {0.0, 1.0};
+    load.x = {3.0, 11.0};
+    load.y = {0.0, 0.0};
+    scene.forces[0].force_signal = load;
+    scene.bodies[0].velocity.x() += faster;
+    return scene;
+  };
+  ExpectGrazing(scene_with, 1e-2);
+}
+
 // A disc that slides off a table: the corner at the end of the face takes over from the face, at no
 // approach speed, within a step. Nothing new touches, and the derivative has no kink there.
 TEST(CertifyGrazingTest, TheCornerAtTheEndOfAFaceDoesNotGraze) {

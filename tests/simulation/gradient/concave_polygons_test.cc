@@ -407,5 +407,53 @@ TEST(ConcavePolygonTest, TwoMovingOnesKeepTheirMomentum) {
   }
 }
 
+// Thin bars and spikes: however long a step is, a body that flies at a corner strikes it where it
+// does with short steps.
+TEST(ConcavePolygonsTest, LongStepsMissNoCorner) {
+  struct Throw {
+    std::vector<double> outline;
+    const char* shape;
+    double x, y, vx, vy, turn, duration;
+  };
+  const std::vector<double> bar = {0, 0, 2, 0, 2, 0.3, 0.3, 0.3, 0.3, 2, 0, 2};
+  const std::vector<double> thin = {0, 0, 2, 0, 2, 0.05, 0.05, 0.05, 0.05, 2, 0, 2};
+  const std::vector<double> spike = {0, 0, 2, 0, 2, 1, 1.05, 1, 1, 2, 0.95, 1, 0, 1};
+  const std::vector<double> notch = {0, 0, 2, 0, 2, 2, 1.1, 1, 1, 0.5, 0.9, 1, 0, 2};
+  const char* disc = R"("circle": {"radius": 0.1})";
+  const char* capsule = R"("capsule": {"length": 0.2, "radius": 0.05})";
+  const std::vector<Throw> throws = {
+      {bar, disc, -1.1935, 2.1605, 19.7436, -3.1924, 0.0, 0.1},
+      {thin, capsule, -0.2487, 3.47, 1.9912, -9.7998, 0.0, 0.2},
+      {spike, capsule, -0.4507, 0.9795, 19.9779, 0.9393, 0.0, 0.1},
+      {notch, capsule, -1.2728, 1.2063, 4.2428, 2.6455, 0.0, 0.4},
+      {thin, capsule, -1.3968, -0.3559, 18.8986, 6.5455, -20.0, 0.1},
+  };
+  for (const Throw& one : throws) {
+    const double duration = one.duration;
+    Scene scene = SceneOf(
+        R"({"gravity": [0, 0], "bodies": [{"name": "s", "static": true, "restitution": 0.5,
+            "friction": 0, "shape": {)" +
+        PolygonText(one.outline) + R"(}}, {"name": "b", "mass": 1, "restitution": 0.5,
+            "friction": 0, "position": [0, 0], "shape": {)" +
+        one.shape + R"(}}], "simulation": {"stepping": "event"}})");
+    scene.simulation.duration = duration;
+    BasicBody<double>& body = scene.bodies[1];
+    body.position = Vector2<double>(one.x, one.y);
+    body.velocity = Vector2<double>(one.vx, one.vy);
+    body.angular_velocity = one.turn;
+    scene.simulation.dt = duration / 1000.0;
+    const RolledConcave fine = RollConcave(scene);
+    EXPECT_GT(fine.report.events, 0);
+    for (const double steps : {1.0, 2.0, 4.0, 10.0, 40.0}) {
+      if (one.turn != 0.0 && steps < 10.0) continue;
+      scene.simulation.dt = duration / steps;
+      const RolledConcave run = RollConcave(scene);
+      for (size_t i = 0; i < run.final.pose.size(); ++i) {
+        EXPECT_NEAR(run.final.pose[i], fine.final.pose[i], 1e-9) << one.shape << " " << steps;
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace tangible
