@@ -192,23 +192,36 @@ double EventDerivative::EventGradient(const Model<double>& model, Segment* segme
     RowMatrixXd seed =
         RowMatrixXd::Zero(3 * static_cast<Eigen::Index>(node.system.num_blocks()), 1);
     const std::vector<int>& block_of = node.system.contact_block();
-    if (segment->event == EventKind::kLiftOff) {
+    const auto add_friction = [&](const CoefficientSource& friction, double force) {
+      for (int k = 0; k < 2; ++k) {
+        if (friction.numbers[k] < 0) continue;
+        entries.push_back(
+            {0, s.ParameterVariable(friction.numbers[k]), friction.derivatives[k] * force});
+      }
+    };
+    for (size_t i = 0; i < segment->release.size(); ++i) {
+      const ReleaseRate& rate = segment->release[i];
+      if (rate.opens == 0.0 && rate.slides == 0.0) continue;
+      const double slides = std::abs(rate.slides);
+      seed(3 * block_of[segment->NormalOf(i)], 0) +=
+          rate.opens + slides * segment->friction[i].value;
+      if (slides == 0.0) continue;
+      seed(3 * block_of[i] + 1, 0) = rate.slides;
+      add_friction(segment->friction[i], slides * node.solution.normal_impulse[i]);
+    }
+    const bool is_single = segment->release.empty();
+    if (is_single && segment->event == EventKind::kLiftOff) {
       seed(3 * block_of[segment->event_index], 0) = 1.0;
     }
     for (size_t i = 0; i < segment->contacts.size(); ++i) {
-      if (segment->event != EventKind::kSlipBegins ||
+      if (!is_single || segment->event != EventKind::kSlipBegins ||
           !segment->SticksWith(i, segment->event_index)) {
         continue;
       }
       const CoefficientSource& friction = segment->event_friction;
       seed(3 * block_of[segment->NormalOf(i)], 0) += friction.value;
       seed(3 * block_of[i] + 1, 0) = -segment->event_sign;
-      for (int k = 0; k < 2; ++k) {
-        if (friction.numbers[k] >= 0) {
-          entries.push_back({0, s.ParameterVariable(friction.numbers[k]),
-                             friction.derivatives[k] * node.solution.normal_impulse[i]});
-        }
-      }
+      add_friction(friction, node.solution.normal_impulse[i]);
     }
     RowMatrixXd w_bar = RowMatrixXd::Zero(s.num_variables() + 1, 1);
     residual = NodeAdjoint(model, *segment, &node, false, &seed, &w_bar);

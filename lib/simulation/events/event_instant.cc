@@ -118,6 +118,7 @@ bool EventStepper::AddInstant(const Model<double>& model, double t, EventKind ki
   segment.before = *state;
   segment.event_number = -1;
   segment.at_once = false;
+  segment.release.clear();
   segment.further_edges.clear();
   segment.edge_before = -1;
   if (!ChooseModes(model, *state, outcome, &segment)) {

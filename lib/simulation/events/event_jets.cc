@@ -224,6 +224,11 @@ class EventReplay {
     if (segment->event == EventKind::kLiftOff || segment->event == EventKind::kSlipBegins) {
       ContactSolution<T> solution;
       Accelerate(*segment, after, time, &segment->end, &solution);
+      if (!segment->release.empty()) {
+        return segment->WorkLeft<T>(
+            [&](size_t i) { return EvaluateCoefficient(segment->friction[i], model_.parameters); },
+            solution);
+      }
       if (segment->event == EventKind::kLiftOff) {
         return solution.normal_impulse[segment->event_index];
       }

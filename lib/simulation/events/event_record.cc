@@ -29,7 +29,8 @@ size_t BytesOf(const Segment& segment) {
          sizeof(ActiveContact) * segment.contacts.capacity() +
          sizeof(CoefficientSource) * segment.friction.capacity() +
          sizeof(ContactMode) * segment.modes.capacity() +
-         sizeof(WindowEdge) * segment.further_edges.capacity() + BytesOf(segment.stages) +
+         sizeof(WindowEdge) * segment.further_edges.capacity() +
+         sizeof(ReleaseRate) * segment.release.capacity() + BytesOf(segment.stages) +
          BytesOf(segment.corrections) + BytesOf(segment.projection) + BytesOf(segment.end) +
          sizeof(double) * static_cast<size_t>(segment.end_dot.size() + segment.end_bar.size());
 }

@@ -5,6 +5,7 @@
 // event or to the step's end, and impacts between them.
 
 #include <Eigen/Core>
+#include <cmath>
 #include <memory>
 #include <vector>
 
@@ -79,6 +80,13 @@ struct WindowEdge {
   double side = 0.0;  ///< −1: the window opens there, 1: it closes
 };
 
+/// How a contact goes as several let go together: the rates at which it opens and slides, as shares
+/// of the largest.
+struct ReleaseRate {
+  double opens = 0.0;   ///< at least 0
+  double slides = 0.0;  ///< along its tangent
+};
+
 /// Smooth motion over [time, time + length] with modes held, then the event that ended it.
 struct Segment {
   double time = 0.0;
@@ -112,6 +120,11 @@ struct Segment {
                             ///< kSupportStops, kSupportLetsGo: the support
   /// kSupportLetsGo: what it then does, with the direction in which the body begins to move.
   SupportState event_support;
+  /// kSlipBegins, kLiftOff: where rows share forces that are not determined, what the contacts do
+  /// that let go together; empty: event_contact, and what sticks with it. The event's function is
+  /// then the work of the held forces and of friction's limits along these rates (WorkLeft), which
+  /// does not depend on the shares, and whose derivative by the rates is 0.
+  std::vector<ReleaseRate> release;
   /// The event's function does not pass through 0 but jumps where poses and twists are corrected at
   /// the start of the segment: the time of the event is that start, whatever varies.
   bool at_once = false;
@@ -138,6 +151,19 @@ struct Segment {
       if (SticksWith(i, k)) return true;
     }
     return false;
+  }
+  /// Σ (opens λn + μ |slides| λn + slides λt) over `release`, W; of a mechanism at its limit 0.
+  template <typename T, typename Coefficient>
+  T WorkLeft(const Coefficient& coefficient_of, const ContactSolution<T>& solution) const {
+    T left(0.0);
+    for (size_t i = 0; i < release.size(); ++i) {
+      const ReleaseRate& rate = release[i];
+      if (rate.opens != 0.0) left += rate.opens * solution.normal_impulse[i];
+      if (rate.slides == 0.0) continue;
+      left += std::abs(rate.slides) * coefficient_of(i) * solution.normal_impulse[i] +
+              rate.slides * solution.tangent_impulse[i];
+    }
+    return left;
   }
   /// The contact whose normal force limits the friction of contact i.
   size_t NormalOf(size_t i) const { return contacts[i].is_rolling ? i - 1 : i; }

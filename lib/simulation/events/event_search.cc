@@ -20,9 +20,6 @@ namespace {
 // thousand.
 constexpr long kEvaluationsOfEvent = 1000;
 
-// From so many closed contacts on the one whose mode ends first is looked for first.
-constexpr size_t kManyContacts = 12;
-
 double SpeedOf(const double* twist, double radius) {
   return std::hypot(twist[0], twist[1]) + std::abs(twist[2]) * radius;
 }
@@ -218,13 +215,9 @@ double EventSearch::ModeValue(const Model<double>& model, Sample* sample, const 
     return SlidingSign(motion.modes[event.index]) *
            SpeedsOf(model, motion.after, motion.contacts[event.index]).slip;
   }
-  if (!sample->has_end) {
-    if (!flow_.Accelerate(model, motion, motion.after, motion.time + motion.length, &sample->end)) {
-      return std::numeric_limits<double>::quiet_NaN();
-    }
-    sample->has_end = true;
-  }
-  const SolvedNode& node = sample->end;
+  const SolvedNode* const end = EndOf(model, sample);
+  if (end == nullptr) return std::numeric_limits<double>::quiet_NaN();
+  const SolvedNode& node = *end;
   const double normal = node.solution.normal_impulse[event.index];
   if (event.kind == EventKind::kLiftOff) {
     return normal;
@@ -440,6 +433,10 @@ void EventSearch::SearchClosed(const Model<double>& model, Event* event) {
     // Values are located to their rounding: that of the fastest point, or of the largest force.
     double located = kLocatedOfSize / kSlowShare * slow_;
     const auto try_function = [&](double at_start, double tolerance) {
+      if (shares_ && trial.kind != EventKind::kSlipEnds &&
+          !IsDetermined(trial, &At(model, segment_->length)->motion.stages[0])) {
+        return;  // SearchRelease tells
+      }
       if (at_start <= tolerance) {
         TryStart(model, tolerance, trial, event);
         return;
@@ -628,7 +625,9 @@ bool EventSearch::Run(const Model<double>& model, const std::vector<ActiveContac
       if (event.kind != EventKind::kAtOnce) SearchLimit(model, static_cast<int>(j), side, &event);
     }
   }
+  shares_ = event.kind != EventKind::kAtOnce && SharesChange(model, segment->length);
   if (event.kind != EventKind::kAtOnce) SearchClosed(model, &event);
+  if (event.kind != EventKind::kAtOnce && !event.at_start) SearchRelease(model, &event);
   if (event.kind != EventKind::kAtOnce && !event.at_start) SearchServos(model, &event);
   if (event.kind != EventKind::kAtOnce && !event.at_start) SearchSupports(model, &event);
   ends_at_start_ = event.at_start;
@@ -638,8 +637,9 @@ bool EventSearch::Run(const Model<double>& model, const std::vector<ActiveContac
   segment->event_index = event.index;
   segment->event_sign = event.sign;
   segment->event_support = event.support;
+  segment->release = event.release;
   segment->at_once = event.at_once;
-  if (event.kind == EventKind::kSlipBegins) {
+  if (event.kind == EventKind::kSlipBegins && event.release.empty()) {
     segment->event_friction = segment->friction[event.index];
   }
   At(model, segment->length);

@@ -21,6 +21,7 @@
 
 #include "tangible/dynamics/elements/support.h"
 #include "tangible/geometry/broad_phase.h"
+#include "tangible/lcp/contact/contact_solver.h"
 #include "tangible/simulation/events/segment_flow.h"
 #include "tangible/simulation/events/tolerances.h"
 
@@ -107,7 +108,8 @@ class EventSearch {
     ActiveContact contact;
     int index = -1;
     double sign = 0.0;
-    SupportState support{};  ///< of kSupportLetsGo
+    SupportState support{};            ///< of kSupportLetsGo
+    std::vector<ReleaseRate> release;  ///< of contacts that let go together
     bool at_once = false;
     bool at_start = false;
   };
@@ -145,6 +147,20 @@ class EventSearch {
   /// The closed contact whose mode ends first, by values at both ends of the motion: once its event
   /// is found, the others are dismissed by its instant alone. Else the first one.
   size_t FirstToEnd(const Model<double>& model, const Event& event);
+  /// Where loads change and rows share forces that are not determined: when accelerations without
+  /// held modes begin to differ from those with them (event_release.cc).
+  void SearchRelease(const Model<double>& model, Event* event);
+  /// Whether they differ after a motion of this length, and the rates at which contacts then go.
+  bool Departs(const Model<double>& model, double length, std::vector<ReleaseRate>* rates);
+  /// Whether loads change in a motion and rows share forces that are not determined.
+  bool SharesChange(const Model<double>& model, double length);
+  bool AreUnneeded(const Model<double>& model, double length, std::vector<ReleaseRate>* rates);
+  bool SolveFree(const Model<double>& model, ContactProblem<double>* problem,
+                 ContactSolution<double>* free);
+  void TakeRelease(const std::vector<ReleaseRate>& rates, double length, Event* event);
+  /// The accelerations after a motion; null where there are none.
+  SolvedNode* EndOf(const Model<double>& model, Sample* sample);
+  double WorkLeft(const Model<double>& model, double length, const std::vector<ReleaseRate>& rates);
   void SearchServos(const Model<double>& model, Event* event);  ///< servo_bounds.cc
   void SearchServo(const Model<double>& model, int servo, double sign, Event* event);
   void SearchSupports(const Model<double>& model, Event* event);  ///< support_bounds.cc
@@ -189,6 +205,7 @@ class EventSearch {
   int num_pairs_with_events_ = 1;
   bool ends_at_start_ = false;
   bool keeps_starts_ = false;
+  bool shares_ = false;   ///< SharesChange of the segment
   bool all_good_ = true;  ///< all samples of this search could be integrated
   std::vector<std::pair<int, int>> pairs_;
   std::vector<std::pair<double, std::pair<int, int>>> order_;  ///< pairs and when they close
@@ -196,6 +213,7 @@ class EventSearch {
   std::vector<double> reach_;  ///< by which the boxes over the segment are grown, m
   BroadPhase broad_phase_;
   SupportFriction support_;
+  ContactSolver solver_;  ///< of accelerations without held modes
   std::string message_;
 };
 

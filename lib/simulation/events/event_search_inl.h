@@ -26,6 +26,9 @@ inline bool Contains(const std::vector<ActiveContact>& contacts, const ActiveCon
                      [&](const ActiveContact& c) { return c.SameAs(contact); });
 }
 
+// From so many closed contacts on the one whose mode ends first is looked for first, and what lets
+// go together only by single contacts.
+inline constexpr size_t kManyContacts = 12;
 inline constexpr int kMostBisections = 1000;
 inline constexpr int kMostRefinements = 200;
 // A function that jumps is halved after so many steps.

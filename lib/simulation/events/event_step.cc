@@ -375,34 +375,6 @@ double EventStepper::SlipAtStart(size_t i, double slow, bool* is_open) const {
   return slip;
 }
 
-bool EventStepper::Releases(const Model<double>& model, const Segment& segment) {
-  if (search_.ends_at_start() && segment.event == EventKind::kSlipEnds) {
-    // It would slide backwards at once: what moves it has only just reached its limit.
-    released_.clear();
-    resting_.push_back(segment.event_contact);
-    SwitchMode(segment);
-  } else if (search_.ends_at_start()) {
-    const bool opens = segment.event == EventKind::kLiftOff;
-    for (const ActiveContact& contact : segment.contacts) {
-      if (opens ? contact.SameAs(segment.event_contact)
-                : contact.IsBetweenTheSame(segment.event_contact)) {
-        released_.push_back({contact, opens ? 0.0 : -segment.event_sign});
-      }
-    }
-  } else {
-    const double slow = search_.SpeedTolerance(model, segment.after);
-    const bool all_go = std::all_of(released_.begin(), released_.end(), [&](const EndingSlip& one) {
-      const ContactSpeeds speeds = SpeedsOf(model, segment.after, one.contact);
-      return (one.sign == 0.0 ? speeds.normal : one.sign * speeds.slip) >= -slow;
-    });
-    released_.clear();
-    search_.KeepStarts(!all_go);
-    if (all_go) return false;
-  }
-  --record_.num_parts;
-  return true;
-}
-
 bool EventStepper::ChooseContactModes(const Model<double>& model, double slow,
                                       std::vector<double> slip, StepReport* outcome,
                                       Segment* segment) {
@@ -470,6 +442,7 @@ bool EventStepper::ChooseContactModes(const Model<double>& model, double slow,
       solution.modes[i] = ContactMode::kSticking;
     }
   }
+  OpenIdle(model, segment, &solution);
   guess_.contacts = segment->contacts;
   guess_.modes = solution.modes;
   ShortenAtEllipses(model, solution, outcome, segment);
@@ -480,6 +453,10 @@ bool EventStepper::ChooseContactModes(const Model<double>& model, double slow,
 }
 
 void EventStepper::SwitchMode(const Segment& segment) {
+  if (!segment.release.empty()) {
+    ReleaseTogether(segment);
+    return;
+  }
   for (size_t i = 0; i < guess_.contacts.size(); ++i) {
     // A body that stops does so at all its contacts; the speed of a contact tells whether it still
     // slides.
@@ -625,6 +602,7 @@ Segment& EventStepper::BeginSegment(double now, double until, const State<double
   segment.before = state;
   segment.event_number = -1;
   segment.at_once = false;
+  segment.release.clear();
   segment.further_edges.clear();
   segment.edge_before = -1;
   return segment;

@@ -253,6 +253,11 @@ class EventStepper {
   /// jam): then none is released. A slip that ends at its start (kSlipEnds) does not begin. Whether
   /// it has taken the segment back.
   bool Releases(const Model<double>& model, const Segment& segment);
+  /// What lets go together in the next motion (Segment::release).
+  void ReleaseTogether(const Segment& segment);
+  /// Opens contacts without a load to which held modes would give a share of what others bear: as
+  /// loads change they would pull, or hold by friction that they do not have.
+  void OpenIdle(const Model<double>& model, Segment* segment, ContactSolution<double>* solution);
   /// The slip with which contact i of touching_ counts, and whether it may be closed.
   double SlipAtStart(size_t i, double slow, bool* is_open) const;
 
@@ -269,6 +274,7 @@ class EventStepper {
   DecompressionSolver decompression_;
   SupportModes supports_;
   SolvedNode start_;  ///< accelerations at the start of a motion, with its supports
+  SolvedNode idle_;   ///< the same with held modes, where contacts have no load
   std::vector<ActiveContact> listed_contacts_;  ///< of it, before their modes are chosen
   std::vector<CoefficientSource> listed_friction_;
   EventGuess guess_;

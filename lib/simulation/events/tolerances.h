@@ -117,6 +117,17 @@ inline constexpr double kNoScale = 1e-300;
 /// Of the forces at work: a force that is negative by more counts as negative, and friction that
 /// exceeds its limit by more as exceeded.
 inline constexpr double kForceTolerance = 1e-10;
+/// Of the same, of accelerations: those without held modes differ from those with them.
+inline constexpr double kDeparts = 1e-9;
+/// Of the largest rate at which contacts let go together: a smaller one is rounding.
+inline constexpr double kSmallRate = 1e-6;
+/// Of a motion: what lets go so soon after its end may do so at it.
+inline constexpr double kPastEnd = 1e-6;
+/// Of the time of a release: how long before it nothing may have let go.
+inline constexpr double kBeforeRelease = 1e-3;
+/// Of the largest normal force: a contact without a load that holds with more has a share of what
+/// others bear.
+inline constexpr double kIdleShare = 1e-9;
 /// Of the acceleration that loads alone give a body: what is accelerated more, from rest and
 /// backwards, is thrown about between others that jam.
 inline constexpr double kJams = 1e3;

@@ -154,5 +154,64 @@ TEST(ForcesAtLimitsTest, AHingeWithFrictionTurnsABody) {
       {{2, 0.495, {0.5, -0.25}}, {5, 0.49, {0.5, -0.5}}}, {0.02, 0.01});
 }
 
+std::string Tile(const std::string& name, double x) {
+  return R"({"name": ")" + name + R"(", "static": true, "friction": 0.5, "position": [)" +
+         std::to_string(x) + R"(, -0.5], "shape": {"box": {"size": [1, 1]}}})";
+}
+std::string Plane(const std::string& name, const std::string& normal, double offset) {
+  return R"({"name": ")" + name + R"(", "static": true, "friction": 0.5, "shape":
+            {"half_plane": {"normal": )" +
+         normal + R"(, "offset": )" + std::to_string(offset) + "}}}";
+}
+
+// Where forces are shared between several bodies no contact's own tells when it lets go:
+// x = k (T − t0)³ / (6 m) with k t0 = μ m g.
+void ExpectLetGo(const std::string& others, double x, double duration, double start = 0.0) {
+  SCOPED_TRACE(others);
+  const double rest = duration - 0.5 * (1.0 - start / 5.0);
+  const Scene scene = Of("[0, -10]", Box("b", x, 0.0, 0.5) + "," + others, duration, kForce);
+  ExpectExact(WithRamp(scene, start, 10.0, false), {"bodies/*/friction"},
+              {{0, x + 10.0 / 6.0 * rest * rest * rest, {-5.0 * rest * rest}},
+               {3, 5.0 * rest * rest, {-10.0 * rest}}});
+}
+
+TEST(ForcesAtLimitsTest, BodiesThatShareForcesLetGoTogether) {
+  const std::string tiles = Tile("left", -0.5) + "," + Tile("right", 0.5);
+  const std::string wall = Plane("wall", "[1, 0]", 0.0);
+  ExpectLetGo(tiles, 0.0, 0.9);
+  ExpectLetGo(Floor(0.5) + "," + wall, 0.1, 1.0);
+  ExpectLetGo(Floor(0.5) + "," + Plane("ceiling", "[0, -1]", -0.1), 0.0, 1.0);
+  // As the run starts, at the limit and just below it.
+  ExpectLetGo(tiles, 0.0, 0.35, 5.0);
+  ExpectLetGo(tiles, 0.0, 0.4, 4.0);
+}
+
+// Two blocks, the first of which pushes the second.
+TEST(ForcesAtLimitsTest, ABlockPushesAnother) {
+  const Scene scene =
+      Of("[0, -10]", Box("b", 0.0, 0.0, 0.5) + "," + Box("c", 0.2, 0.0, 0.5) + "," + Floor(0.5),
+         1.0, kForce);
+  ExpectExact(WithRamp(scene, 0.0, 20.0, false), {"bodies/*/friction"},
+              {{0, 0.625 / 3.0, {-1.25}}, {6, 0.2 + 0.625 / 3.0, {-1.25}}});
+}
+
+// A block between two walls that it touches without a load is lifted.
+TEST(ForcesAtLimitsTest, ABlockIsLiftedBetweenWalls) {
+  const Scene scene = Of("[0, -10]",
+                         Box("b", 0.1, 0.0, 0.5) + "," + Floor(0.5) + "," +
+                             Plane("left", "[1, 0]", 0.0) + "," + Plane("right", "[-1, 0]", -0.2),
+                         1.0, kForce);
+  // How hard the walls press is not determined, which the certificate says.
+  for (const double dt : {0.5, 0.25, 0.1, 0.03}) {
+    Scene lifted = WithRamp(scene, 0.0, 20.0, true);
+    lifted.simulation.dt = dt;
+    const GradientResult result =
+        testing::Jacobian(lifted, {"bodies/b/mass"}, GradientMethod::kAdjoint);
+    EXPECT_NEAR(result.values[1], 0.05 + 20.0 / 48.0, kOfValue) << dt;
+    EXPECT_NEAR(result.jacobian(1, 0), -20.0 / 48.0 - 1.25, kOfDerivative) << dt;
+    EXPECT_NEAR(result.jacobian(4, 0), -7.5, kOfDerivative) << dt;
+  }
+}
+
 }  // namespace
 }  // namespace tangible
