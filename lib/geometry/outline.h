@@ -152,9 +152,9 @@ int FindFeaturesOfRuns(const PlacedRun& a, const PlacedRun& b, double max_gap,
 /// The distance of two runs, 0 where they cross, m. Sets the ends that are nearest.
 double DistanceOfRuns(const PlacedRun& a, const PlacedRun& b, int* end_a, int* end_b);
 
-/// A lower bound of the distance of a run and a shape, 0 where they cross, less the shape's radius,
-/// m; the distance itself unless the shape is an ellipse. Sets the end of the run and the vertex of
-/// the shape that are nearest.
+/// A lower bound of the distance of a run and a shape, 0 where they cross, less the shape's
+/// radius, m; the distance itself unless the shape is an ellipse. Sets the end of the run and the
+/// vertex of the shape that are nearest.
 double DistanceOfRun(const Outline& outline, int run, const Pose<double>& pose,
                      const ShapeView<double>& shape, const Pose<double>& shape_pose, int* corner,
                      int* vertex);

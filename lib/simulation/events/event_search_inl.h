@@ -253,8 +253,8 @@ bool EventSearch::FirstRoot(const Model<double>& model, const Gap& gap, const Ra
       continue;
     }
     const double reach = i.b - i.a > smallest ? rate_over(i.a, i.b) * (i.b - i.a) : 0.0;
-    // A gap that is infinite at one end alone, as of a body that is behind a run of an outline there,
-    // may close as soon as the other end's allows.
+    // A gap that is infinite at one end alone, as of a body that is behind a run of an outline
+    // there, may close as soon as the other end's allows.
     const double least = std::isinf(i.fa) != std::isinf(i.fb) ? std::min(i.fa, i.fb) : i.fa + i.fb;
     if (i.fb > 0.0 && (least > reach || i.b - i.a <= smallest)) {
       continue;
