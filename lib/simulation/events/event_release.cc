@@ -28,8 +28,8 @@ constexpr int kMostReleases = 8;
 // As a multiple of the accelerations that loads cause: keeps sliding contacts sliding.
 constexpr double kKeepsSliding = 1e4;
 
-// Whether loads change by more than rounding.
-bool LoadsDiffer(const std::vector<double>& x, const std::vector<double>& y) {
+// Whether loads, or forces, change by more than rounding.
+bool Differ(const std::vector<double>& x, const std::vector<double>& y) {
   double largest = 0.0, change = 0.0;
   for (size_t i = 0; i < x.size(); ++i) {
     largest = std::max({largest, std::abs(x[i]), std::abs(y[i])});
@@ -148,8 +148,16 @@ bool EventSearch::SharesChange(const Model<double>& model, double length) {
   const SolvedNode* const end = EndOf(model, At(model, length));
   if (end == nullptr) return false;
   const SolvedNode& start = At(model, length)->motion.stages[0];
-  return LoadsDiffer(start.problem.load, end->problem.load) &&
-         CountRedundantRows(start.problem, segment_->modes) > 0;
+  // Of bodies without joints, as in a heap at rest, forces change with loads alone, but for
+  // rounding.
+  const ModelStructure& structure = *model.structure;
+  const ContactSolution<double>& first = start.solution;
+  const ContactSolution<double>& last = end->solution;
+  const bool change =
+      !structure.paths.empty() || Differ(start.problem.load, end->problem.load) ||
+      (!structure.joints.empty() && (Differ(first.normal_impulse, last.normal_impulse) ||
+                                     Differ(first.tangent_impulse, last.tangent_impulse)));
+  return change && CountRedundantRows(start.problem, segment_->modes) > 0;
 }
 
 // Contacts that would open, or that pull with held modes: where accelerations are the same at the

@@ -141,16 +141,10 @@ void EventSearch::SearchStop(const Model<double>& model, int support, Event* eve
 
 // The forces of a support's rows at the end of a motion; null where there is none.
 const double* EventSearch::HeldAt(const Model<double>& model, int support, Sample* sample) {
-  if (!sample->good) return nullptr;
-  const Segment& motion = sample->motion;
-  if (!sample->has_end) {
-    if (!flow_.Accelerate(model, motion, motion.after, motion.time + motion.length, &sample->end)) {
-      return nullptr;
-    }
-    sample->has_end = true;
-  }
+  const SolvedNode* const end = EndOf(model, sample);
+  if (end == nullptr) return nullptr;
   const size_t row = model.structure->joints.size() + static_cast<size_t>(support);
-  return &sample->end.solution.joint_impulse[3 * row];
+  return &end->solution.joint_impulse[3 * row];
 }
 
 // What a support does where its rows would need these forces, if it cannot give them; `slow` tells.
@@ -176,6 +170,22 @@ SupportState EventSearch::LetsGoAt(const Model<double>& model, const State<doubl
   return next;
 }
 
+// Whether what a support would have to give along the motion that it lets begin is determined: of
+// bodies that touch, or that joints connect, while their supports hold them the shares are not.
+// Together they may hold what the share of one is too large for; whether they do is decided as the
+// next motion starts, for all of them at once.
+bool EventSearch::IsShareDetermined(const Model<double>& model, int support,
+                                    const SupportState& next, SolvedNode* node) const {
+  const size_t joint = model.structure->joints.size() + static_cast<size_t>(support);
+  std::vector<double> seed(3 * static_cast<size_t>(node->system.num_blocks()), 0.0);
+  const size_t row = 3 * (static_cast<size_t>(model.structure->num_blocks()) + joint);
+  for (int r = 0; r < node->problem.joints[joint].rows; ++r) {
+    seed[row + static_cast<size_t>(r)] = next.twist[static_cast<size_t>(r)];
+  }
+  return node->system.SolveTransposed(node->problem, node->solution.modes, seed.data(), 1) <=
+         kDetermined;
+}
+
 // Searches for the time at which a support can no longer hold what it holds.
 void EventSearch::SearchLetsGo(const Model<double>& model, int support, Event* event) {
   const int holds = segment_->before.supports[support].holds;
@@ -195,6 +205,7 @@ void EventSearch::SearchLetsGo(const Model<double>& model, int support, Event* e
       a = b;
       continue;
     }
+    if (!IsShareDetermined(model, support, beyond, EndOf(model, At(model, b)))) return;
     Event trial;
     trial.kind = EventKind::kSupportLetsGo;
     trial.contact = ContactOfSupport(*model.structure, support);

@@ -197,6 +197,8 @@ bool SupportModes::Accept(const Model<double>& model, const ContactProblem<doubl
   } else {
     settled = iteration_.Accept(model, problem, solution, &before);
   }
+  const bool may_share = !segment->contacts.empty() || !s.joints.empty();
+  if (settled && may_share && HoldSharing(model, solution, segment)) return false;
   for (int k = 0; k < static_cast<int>(s.supports.size()); ++k) {
     if (at_rest_[k] == 0) continue;
     SupportState& at = before.supports[k];
@@ -227,6 +229,35 @@ bool SupportModes::Accept(const Model<double>& model, const ContactProblem<doubl
     started_ = false;
   }
   return accepted && settled;
+}
+
+bool SupportModes::HoldSharing(const Model<double>& model, const ContactSolution<double>& solution,
+                               Segment* segment) {
+  const ModelStructure& s = *model.structure;
+  std::vector<int> still;
+  bool any = false;
+  for (int k = 0; k < static_cast<int>(s.supports.size()); ++k) {
+    if (at_rest_[k] == 0 || courses_[k] != Course::kRests) continue;
+    friction_.Set(model, segment->before, s.supports[k], 1.0);
+    const double unit = friction_.limit() / model.parameters[s.bodies[s.supports[k].body].mass];
+    const double* acceleration = NumbersOfBlock(model, k, solution.motion);
+    if (!(SpeedOfPart(friction_, SupportState::kBody, acceleration) <= kStandingPoint * unit)) {
+      continue;
+    }
+    still.push_back(k);
+    any = any || segment->before.supports[k].holds == SupportState::kNothing;
+  }
+  if (!any) return false;
+  for (const int k : still) {
+    const bool is_centre = s.supports[k].kind == SupportIndex::kCentre;
+    SupportState& at = segment->before.supports[k];
+    at = SupportState();
+    at.holds = is_centre ? 0 : static_cast<int>(SupportState::kBody);
+    courses_[k] = Course::kShares;
+    at_rest_[k] = 0;
+  }
+  started_ = false;
+  return true;
 }
 
 // Of a point at rest on a body that turns: whether friction holds it, or else the direction in

@@ -66,6 +66,7 @@ class SupportModes {
     kTurns,     ///< a point is at rest
     kPasses,    ///< a point is slow, and begins to move or only passes a low speed
     kReleased,  ///< an event has let go what was held
+    kShares,    ///< the body is at rest, and others share what its support is at its limit for
   };
   struct Rested {
     int support = -1;
@@ -76,6 +77,10 @@ class SupportModes {
   Course CourseOfPoints(const SupportIndex& support, double stops, double starts, SupportState* at);
   bool AcceptOne(const Model<double>& model, int k, const ContactSolution<double>& solution,
                  Segment* segment);
+  /// Bodies at rest whose accelerations are 0 although a support is at its limit: what others take
+  /// from it holds them all. Whether there are any.
+  bool HoldSharing(const Model<double>& model, const ContactSolution<double>& solution,
+                   Segment* segment);
   bool AcceptPoint(int point, const double acceleration[3], double turn, const double* held,
                    int* changes, SupportState* at) const;
   void Seek(int k, SupportState* at);

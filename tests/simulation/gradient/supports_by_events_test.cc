@@ -4,6 +4,7 @@
 // and an integrator of its own.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <utility>
@@ -325,6 +326,39 @@ TEST(SupportsByEventsTest, BlocksThatPushEachOther) {
     EXPECT_GT(result.jacobian.col(c).cwiseAbs().maxCoeff(), 1e-6) << paths[c];
   }
   ExpectOthersAgree(scene, paths, result);
+}
+
+// Two blocks of 1 kg whose supports hold 1 N and `other` each, the first pushed with F: one alone
+// could not hold it. The second touches it, or a hinge joins them.
+TEST(SupportsByEventsTest, WhatOneSupportCannotHoldItsNeighbourShares) {
+  for (const bool joined : {false, true}) {
+    for (const double other : {1.0, 3.0}) {
+      for (const double force : {1.5, 5.0}) {
+        const std::string box = R"("mass": 1, "shape": {"box": {"size": [0.2, 0.2]}}, )";
+        const Scene scene = SceneOf(
+            R"({"gravity": [0, 0], "bodies": [{"name": "b", )" + box +
+            R"("position": [0, 0], "support": {"friction": 0.5, "load": 2}}, {"name": "c", )" +
+            box + R"("position": [0.2, 0], "support": {"friction": 0.5, "load": )" +
+            std::to_string(2.0 * other) +
+            R"(}}], "forces": [{"name": "f", "body": "b", "force": [)" + std::to_string(force) +
+            ", 0]}]" +
+            (joined ? R"(, "joints": [{"name": "j", "type": "revolute", "bodies": ["b", "c"],
+                                       "anchor": [0.1, 0]}])"
+                    : "") +
+            R"(, "simulation": {"stepping": "event", "dt": 0.1, "duration": 0.5}})");
+        Model<double> model;
+        State<double> state;
+        BuildModel(scene, &model, &state);
+        State<double> final;
+        const RolloutReport report = Rollout(model, state, nullptr, &final);
+        ASSERT_EQ(report.status, StepStatus::kDone) << report.message;
+        const double left = std::max(force - 1.0 - other, 0.0);
+        const size_t c = 3 * static_cast<size_t>(model.structure->moving[1]);
+        EXPECT_NEAR(final.pose[c], 0.2 + 0.25 * left * 0.25, 1e-9) << joined << other << force;
+        EXPECT_EQ(final.twist[c] == 0.0, left == 0.0);
+      }
+    }
+  }
 }
 
 }  // namespace
