@@ -145,12 +145,18 @@ bool EventSearch::SharesChange(const Model<double>& model, double length) {
       std::any_of(contacts.begin(), contacts.end(), [](const auto& c) { return c.is_rolling; })) {
     return false;
   }
+  // The two ends of a face, alone, are one function (Segment::SticksWith).
+  const ModelStructure& structure = *model.structure;
+  if (structure.joints.empty() && std::all_of(contacts.begin(), contacts.end(), [&](const auto& c) {
+        return c.IsBetweenTheSame(contacts.front());
+      })) {
+    return false;
+  }
   const SolvedNode* const end = EndOf(model, At(model, length));
   if (end == nullptr) return false;
   const SolvedNode& start = At(model, length)->motion.stages[0];
   // Of bodies without joints, as in a heap at rest, forces change with loads alone, but for
   // rounding.
-  const ModelStructure& structure = *model.structure;
   const ContactSolution<double>& first = start.solution;
   const ContactSolution<double>& last = end->solution;
   const bool change =
