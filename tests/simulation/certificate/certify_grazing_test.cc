@@ -47,7 +47,7 @@ TEST(CertifyGrazingTest, AThrowThatJustReachesTheCeilingIsNearAKink) {
   }
 }
 
-Certificate CertificateOf(const Scene& scene) {
+Certificate CertificateOfThrow(const Scene& scene) {
   Model<double> model;
   State<double> initial;
   BuildModel(scene, &model, &initial);
@@ -61,14 +61,14 @@ void ExpectGrazing(const SceneWith& scene_with, double far) {
     for (const double off : {0.0, 1e-10, -1e-10}) {
       Scene scene = scene_with(off);
       scene.simulation.dt = dt;
-      const Certificate c = CertificateOf(scene);
+      const Certificate c = CertificateOfThrow(scene);
       EXPECT_EQ(c.verdict.find("near a kink: "), 0u) << off << " " << dt << " " << c.verdict;
       EXPECT_NE(c.margin_where.find("grazing"), std::string::npos) << c.margin_where;
     }
     for (const double off : {far, -far}) {
       Scene scene = scene_with(off);
       scene.simulation.dt = dt;
-      EXPECT_EQ(CertificateOf(scene).verdict, "trustworthy") << off << " " << dt;
+      EXPECT_EQ(CertificateOfThrow(scene).verdict, "trustworthy") << off << " " << dt;
     }
   }
 }
@@ -79,7 +79,7 @@ TEST(CertifyGrazingTest, ASliderThatJustReachesItsLimitIsNearAKink) {
     Scene scene = test_scenes::SceneOf(R"({"gravity": [0, -8], "bodies": [
         {"name": "b", "mass": 1, "inertia": 1, "position": [0, 0], "velocity": [0, 0.25]}],
       "joints": [{"name": "j", "type": "prismatic", "bodies": ["b", "world"], "anchor": [0, 0],
-                  "axis": [0, 1], "limits": [-9, 1], "restitution": 1}],
+                  "axis": [0, 1], "limits": [-9, 1], "limit_restitution": 1}],
       "simulation": {"duration": 0.0625, "stepping": "event"}})");
     scene.joints[0].limits->second = 1.0 / 256.0 + higher;
     return scene;
