@@ -159,8 +159,8 @@ double DistanceOfRun(const Outline& outline, int run, const Pose<double>& pose,
                      const ShapeView<double>& shape, const Pose<double>& shape_pose, int* corner,
                      int* vertex);
 
-/// Whether a vertex of a shape, less its radius, is more than `margin` (m) behind a run of a polygon
-/// and in its solid, with its foot on the run: another run may be nearer.
+/// Whether a vertex of a shape, less its radius, is more than `margin` (m) behind a run of a
+/// polygon and in its solid, with its foot on the run: another run may be nearer.
 bool IsInSolidBehind(const Outline& outline, int run, const Pose<double>& pose,
                      const ShapeView<double>& shape, const Pose<double>& shape_pose, double margin);
 

@@ -420,6 +420,12 @@ bool EventSearch::IsClearOfHalf(const Model<double>& model, const Event& trial, 
   return at_end > 0.0 && half > kClearOfHalf * std::min(at_start, at_end);
 }
 
+// Whether SearchRelease tells it.
+bool EventSearch::IsShared(const Model<double>& model, const Event& trial) {
+  return shares_ && trial.kind != EventKind::kSlipEnds &&
+         !IsDetermined(trial, &At(model, segment_->length)->motion.stages[0]);
+}
+
 void EventSearch::SearchClosed(const Model<double>& model, Event* event) {
   if (segment_->contacts.empty()) return;
   // Of few contacts a search in their order costs little.
@@ -433,10 +439,7 @@ void EventSearch::SearchClosed(const Model<double>& model, Event* event) {
     // Values are located to their rounding: that of the fastest point, or of the largest force.
     double located = kLocatedOfSize / kSlowShare * slow_;
     const auto try_function = [&](double at_start, double tolerance) {
-      if (shares_ && trial.kind != EventKind::kSlipEnds &&
-          !IsDetermined(trial, &At(model, segment_->length)->motion.stages[0])) {
-        return;  // SearchRelease tells
-      }
+      if (IsShared(model, trial)) return;
       if (at_start <= tolerance) {
         TryStart(model, tolerance, trial, event);
         return;
@@ -576,6 +579,20 @@ void EventSearch::SortPairs(const Model<double>& model) {
   for (size_t i = 0; i < order_.size(); ++i) pairs_[i] = order_[i].second;
 }
 
+void EventSearch::SetEvent(const Event& event, Segment* segment) {
+  segment->length = event.length;
+  segment->event = event.kind;
+  segment->event_contact = event.contact;
+  segment->event_index = event.index;
+  segment->event_sign = event.sign;
+  segment->event_support = event.support;
+  segment->release = event.release;
+  segment->at_once = event.at_once;
+  if (event.kind == EventKind::kSlipBegins && event.release.empty()) {
+    segment->event_friction = segment->friction[event.index];
+  }
+}
+
 bool EventSearch::Run(const Model<double>& model, const std::vector<ActiveContact>& touching,
                       Segment* segment, std::string* message) {
   segment_ = segment;
@@ -631,17 +648,7 @@ bool EventSearch::Run(const Model<double>& model, const std::vector<ActiveContac
   if (event.kind != EventKind::kAtOnce && !event.at_start) SearchServos(model, &event);
   if (event.kind != EventKind::kAtOnce && !event.at_start) SearchSupports(model, &event);
   ends_at_start_ = event.at_start;
-  segment->length = event.length;
-  segment->event = event.kind;
-  segment->event_contact = event.contact;
-  segment->event_index = event.index;
-  segment->event_sign = event.sign;
-  segment->event_support = event.support;
-  segment->release = event.release;
-  segment->at_once = event.at_once;
-  if (event.kind == EventKind::kSlipBegins && event.release.empty()) {
-    segment->event_friction = segment->friction[event.index];
-  }
+  SetEvent(event, segment);
   At(model, segment->length);
   // If a motion could not be integrated, the events that it would have met are unknown.
   if (!all_good_) {
