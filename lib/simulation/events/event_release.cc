@@ -38,6 +38,24 @@ bool Differ(const std::vector<double>& x, const std::vector<double>& y) {
   return change > kForceTolerance * largest;
 }
 
+// Whether all contacts are inside their limits with held modes, by this share of them: then
+// accelerations without held modes are the same.
+constexpr double kAmple = 0.001;
+bool AreInside(const Segment& segment, const ContactSolution<double>& held) {
+  double largest = 0.0;
+  for (const double force : held.normal_impulse) largest = std::max(largest, force);
+  for (size_t i = 0; i < segment.contacts.size(); ++i) {
+    const double normal = held.normal_impulse[i];
+    if (!segment.contacts[i].IsPureFriction() && !(normal > kAmple * largest)) return false;
+    const double limit = segment.friction[i].value * normal;
+    if (segment.modes[i] == ContactMode::kSticking &&
+        !(std::abs(held.tangent_impulse[i]) < (1.0 - kAmple) * limit)) {
+      return false;
+    }
+  }
+  return true;
+}
+
 double ScaleOf(const ContactProblem<double>& problem) {
   return std::max({LoadAcceleration(problem), LimitAcceleration(problem), kNoScale});
 }
@@ -153,7 +171,7 @@ bool EventSearch::SharesChange(const Model<double>& model, double length) {
     return false;
   }
   const SolvedNode* const end = EndOf(model, At(model, length));
-  if (end == nullptr) return false;
+  if (end == nullptr || AreInside(*segment_, end->solution)) return false;
   const SolvedNode& start = At(model, length)->motion.stages[0];
   // Of bodies without joints, as in a heap at rest, forces change with loads alone, but for
   // rounding.
