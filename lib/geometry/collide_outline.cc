@@ -261,7 +261,7 @@ double DistanceOfRun(const Outline& outline, int run, const Pose<double>& pose,
   const Vector2<double> ends[2] = {of.start, outline.EndPlace(run)};
   double best = kInfinity;
   double nearest = kInfinity;
-  bool meets = false;
+  bool crosses = false;
   int sides[2] = {0, 0};  // of the core's edges, on whose left the run's start is, or the right
   for (int j = 0; j < core.Size(); ++j) {
     const Vector2<double> x = core.VertexAt(j);
@@ -279,12 +279,12 @@ double DistanceOfRun(const Outline& outline, int run, const Pose<double>& pose,
       for (const Vector2<double>& end : ends) {
         best = std::min(best, internal::DistanceOfSegment(x, next, end));
       }
-      meets = meets || internal::SegmentsMeet(ends[0], ends[1], x, next);
+      crosses = crosses || internal::SegmentsCross(ends[0], ends[1], x, next);
       ++sides[Cross(Vector2<double>(next - x), Vector2<double>(ends[0] - x)) > 0.0 ? 0 : 1];
     }
   }
   // Within the core the run's start is on the same side of all its edges.
-  if (meets || (core.Size() > 2 && (sides[0] == 0 || sides[1] == 0))) best = 0.0;
+  if (crosses || (core.Size() > 2 && (sides[0] == 0 || sides[1] == 0))) best = 0.0;
   const double radius =
       shape.type == ShapeType::kEllipse ? BoundingRadius(shape) : CoreRadius(shape);
   return best - radius;

@@ -46,15 +46,16 @@ inline double DistanceOfSegment(const Vector2<double>& start, const Vector2<doub
   return (x - start - share * along).norm();
 }
 
-/// Whether two segments meet.
-inline bool SegmentsMeet(const Vector2<double>& a, const Vector2<double>& b,
-                         const Vector2<double>& c, const Vector2<double>& d) {
+/// Whether two segments cross. Those that only touch do not, nor those on one line, which may be
+/// apart.
+inline bool SegmentsCross(const Vector2<double>& a, const Vector2<double>& b,
+                          const Vector2<double>& c, const Vector2<double>& d) {
   const auto sides = [](const Vector2<double>& from, const Vector2<double>& to,
                         const Vector2<double>& x, const Vector2<double>& y) {
     return Cross(Vector2<double>(to - from), Vector2<double>(x - from)) *
            Cross(Vector2<double>(to - from), Vector2<double>(y - from));
   };
-  return sides(a, b, c, d) <= 0.0 && sides(c, d, a, b) <= 0.0;
+  return sides(a, b, c, d) < 0.0 && sides(c, d, a, b) < 0.0;
 }
 
 }  // namespace tangible::internal

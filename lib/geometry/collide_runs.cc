@@ -192,7 +192,7 @@ double DistanceOfRuns(const PlacedRun& a, const PlacedRun& b, int* end_a, int* e
       *end_b = j == 0 ? b.of().first : b.outline.EndOf(b.run);
     }
   }
-  if (internal::SegmentsMeet(of_a[0], of_a[1], of_b[0], of_b[1])) return 0.0;
+  if (internal::SegmentsCross(of_a[0], of_a[1], of_b[0], of_b[1])) return 0.0;
   return best;
 }
 

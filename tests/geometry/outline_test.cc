@@ -170,6 +170,13 @@ TEST(OutlineTest, TheDistanceOfARunIsThatOfTheNearestPoints) {
                             Pose<double>(Vector2<double>(3.0, -0.05), 0.0), &corner, &vertex),
               0.5, 1e-15);
   EXPECT_EQ(corner, 0);
+  const auto distance = [&](double x, double y) {
+    return DistanceOfRun(Outline(line), 0, Pose<double>(), box,
+                         Pose<double>(Vector2<double>(x, y), 0.0), &corner, &vertex);
+  };
+  // Its lower face on the line of the run, beyond its end; across the run.
+  EXPECT_NEAR(distance(3.0, 0.1), 0.5, 1e-15);
+  EXPECT_EQ(distance(1.5, 0.0), 0.0);
 }
 
 }  // namespace

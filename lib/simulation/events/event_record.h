@@ -152,7 +152,7 @@ struct Segment {
     }
     return false;
   }
-  /// Σ (opens λn + μ |slides| λn + slides λt) over `release`, W; of a mechanism at its limit 0.
+  /// Σ (opens λn + μ |slides| λn + slides λt) over `release`, N; of a mechanism at its limit 0.
   template <typename T, typename Coefficient>
   T WorkLeft(const Coefficient& coefficient_of, const ContactSolution<T>& solution) const {
     T left(0.0);
