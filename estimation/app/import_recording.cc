@@ -131,7 +131,11 @@ int ImportTable(const std::string& file, TableFormat format) {
   if (!error.empty()) {
     return ReportError(error);
   }
-  std::printf("%zu rows, %ld coordinates missing\n", recording.rows.size(), recording.missing);
+  if (recording.target_column == "event") {
+    std::printf("%zu events\n", recording.rows.size());
+  } else {
+    std::printf("%zu rows, %ld coordinates missing\n", recording.rows.size(), recording.missing);
+  }
   if (recording.start != 0.0) {
     const std::string start = CsvNumber(recording.start);
     std::printf("times count from %s s of the recording\n", start.c_str());

@@ -4,62 +4,22 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <sstream>
 #include <system_error>
 #include <utility>
 
 #include "tangible/estimation/experiments/recording.h"
+#include "tangible/estimation/experiments/recording_mapping.h"
 #include "tangible/estimation/experiments/tolerances.h"
 #include "tangible/math/scalar.h"
 #include "tangible/scene/csv.h"
 #include "tangible/scene/json_reader.h"
-#include "tangible/scene/scene_names.h"
 #include "tangible/scene/text_file.h"
 
 namespace tangible {
 namespace {
-
-/// One column of a file.
-struct ValueColumn {
-  int column = -1;
-  std::string name;  ///< of the body or point; empty: the row says it
-  std::string relative_to;
-  Coordinate coordinate = Coordinate::kX;
-  double scale = 1.0;
-  double offset = 0.0;
-  int likelihood = -1;  ///< its column, −1: none
-};
-
-/// The layout of a file: the meaning of its columns.
-struct Layout {
-  std::string target_column = "point";
-  int time = -1;  ///< −1: rows are frames
-  double time_scale = 1.0;
-  double time_offset = 0.0;
-  int frame = -1;  ///< column of the frame's number; −1: the row's
-  int name = -1;
-  std::map<std::string, std::string> names;  ///< empty: all as they are
-  std::vector<ValueColumn> values;
-};
-
-/// The name with the characters that observation files and paths allow.
-std::string Cleaned(const std::string& name) {
-  std::string clean = name;
-  for (char& c : clean) {
-    if (!IsName(std::string(1, c))) {
-      c = '_';
-    }
-  }
-  return clean;
-}
-
-/// The name with each line break as a space, which is how CommaText leaves it in a cell.
-std::string InOneLine(std::string name) {
-  name.erase(std::remove(name.begin(), name.end(), '\r'), name.end());
-  std::replace(name.begin(), name.end(), '\n', ' ');
-  return name;
-}
 
 /// What separates the cells of a text: what its first lines have outside of quotes.
 char SeparatorOf(std::string_view text) {
@@ -213,7 +173,7 @@ bool ReadDeepLabCut(std::string text, const std::string& file, CsvTable* table, 
   layout->frame = 0;
   std::map<std::string, int> likelihood;
   const auto name_of = [&](size_t i) {
-    return Cleaned(individuals.empty() ? parts[i] : individuals[i] + "." + parts[i]);
+    return CleanedName(individuals.empty() ? parts[i] : individuals[i] + "." + parts[i]);
   };
   for (size_t i = 1; i < parts.size(); ++i) {
     if (coords[i] == "likelihood") {
@@ -265,7 +225,7 @@ bool ReadTracker(std::string text, const std::string& file, CsvTable* table, Lay
     track = multi && !tracks[i].empty() ? tracks[i] : track;
     ValueColumn value;
     value.column = static_cast<int>(i);
-    value.name = Cleaned(track);
+    value.name = CleanedName(track);
     if (columns[i] == "t") {
       layout->time = static_cast<int>(i);
     } else if (TrackerCoordinate(columns[i], &value.coordinate)) {
@@ -295,134 +255,6 @@ bool ReadTracker(std::string text, const std::string& file, CsvTable* table, Lay
   return ParseRows(rows, file, columns.size(), multi ? 3 : 2, table, error);
 }
 
-/// Reads a mapping for the columns of a table.
-class MappingReader {
- public:
-  MappingReader(const JsonReader& root, const CsvTable& table, Layout* layout)
-      : root_(root), table_(table), layout_(layout) {}
-
-  void Read() {
-    root_.ExpectKeys({"time", "target", "name", "names", "columns"}, " of a mapping");
-    if (root_.Has("time")) {
-      ReadTime(root_.At("time"));
-    }
-    const bool is_long = root_.Has("name");
-    if (is_long) {
-      layout_->name = ColumnOf(root_.At("name"));
-      layout_->target_column = root_.At("target").Choice(kTargets);
-      if (root_.Has("names")) {
-        const JsonReader names = root_.At("names");
-        if (!names.IsObject()) {
-          names.FailExpected("an object of names");
-        }
-        for (const std::string& name : names.Keys()) {
-          layout_->names[InOneLine(name)] = NameAt(names.At(name));
-        }
-      }
-    } else if (root_.Has("target") || root_.Has("names")) {
-      root_.At(root_.Has("target") ? "target" : "names")
-          .Fail("goes with name, the column that says whose a row is");
-    }
-    const JsonReader columns = root_.At("columns");
-    const int count = columns.ExpectArray("an array of {column, coordinate}");
-    for (int i = 0; i < count && root_.ok(); ++i) {
-      layout_->values.push_back(ReadColumn(columns.At(i), is_long));
-    }
-    if (count == 0) {
-      columns.Fail("expected at least one column, got none");
-    }
-  }
-
- private:
-  static constexpr std::pair<const char*, const char*> kTargets[] = {{"body", "body"},
-                                                                     {"point", "point"}};
-
-  int ColumnOf(const JsonReader& json) const {
-    const std::string name = json.String();
-    const int column = table_.Column(InOneLine(name));
-    if (column < 0 && json.IsString()) {
-      std::string names;
-      for (const std::string& other : table_.columns) {
-        names += (names.empty() ? "" : ", ") + other;
-      }
-      json.FailExpected("the name of a column of " + table_.file + " (" + names + ")");
-    }
-    return column;
-  }
-
-  static std::string NameAt(const JsonReader& json) {
-    std::string name = json.String();
-    if (json.IsString() && !IsName(name)) {
-      json.FailExpected("a name of letters, digits and _.-");
-    }
-    return name;
-  }
-
-  static double ScaleAt(const JsonReader& json) {
-    if (!json.Has("scale")) {
-      return 1.0;
-    }
-    const double scale = json.At("scale").Number();
-    if (scale == 0.0) {
-      json.At("scale").FailExpected("a number other than 0");
-    }
-    return scale;
-  }
-
-  void ReadTime(const JsonReader& json) {
-    if (json.IsString()) {
-      layout_->time = ColumnOf(json);
-      return;
-    }
-    json.ExpectKeys({"column", "scale", "offset"}, " of time");
-    layout_->time = ColumnOf(json.At("column"));
-    layout_->time_scale = json.Has("scale") ? json.At("scale").Number(NumberKind::kPositive) : 1.0;
-    layout_->time_offset = json.Has("offset") ? json.At("offset").Number() : 0.0;
-  }
-
-  ValueColumn ReadColumn(const JsonReader& json, bool is_long) {
-    json.ExpectKeys({"column", "coordinate", "body", "point", "relative_to", "scale", "offset"},
-                    " of a column");
-    ValueColumn value;
-    value.column = ColumnOf(json.At("column"));
-    value.coordinate = ReadCoordinate(json.At("coordinate"));
-    value.scale = ScaleAt(json);
-    value.offset = json.Has("offset") ? json.At("offset").Number() : 0.0;
-    value.relative_to = json.Has("relative_to") ? NameAt(json.At("relative_to")) : "";
-    if (json.Has("body") + json.Has("point") != (is_long ? 0 : 1)) {
-      json.Fail(is_long ? "expected no body or point: the column of names says whose a row is"
-                        : "expected a body or a point, got both or neither");
-      return value;
-    }
-    if (!is_long) {
-      const char* const target = json.Has("body") ? "body" : "point";
-      if (!layout_->values.empty() && layout_->target_column != target) {
-        json.At(target).Fail(
-            "expected all columns to be of bodies, or all of points: an observation file has one "
-            "kind");
-      }
-      layout_->target_column = target;
-      value.name = NameAt(json.At(target));
-    }
-    return value;
-  }
-
-  static Coordinate ReadCoordinate(const JsonReader& json) {
-    const std::string name = json.String();
-    for (int i = 0; i < kBodyCoordinates; ++i) {
-      if (name == NameOf(static_cast<Coordinate>(i))) {
-        return static_cast<Coordinate>(i);
-      }
-    }
-    json.FailExpected("x, y, angle, vx, vy, omega, distance, ax, ay or alpha");
-    return Coordinate::kX;
-  }
-
-  JsonReader root_;
-  const CsvTable& table_;
-  Layout* layout_;
-};
-
 bool ReadTable(const std::string& text, const std::string& file, const TableOptions& options,
                CsvTable* table, Layout* layout, std::string* error) {
   Json json;
@@ -431,7 +263,7 @@ bool ReadTable(const std::string& text, const std::string& file, const TableOpti
     return false;
   }
   JsonErrors errors(options.mapping_file);
-  MappingReader(JsonReader(json, &errors), *table, layout).Read();
+  ReadMapping(JsonReader(json, &errors), *table, layout);
   if (!errors.ok()) {
     *error = errors.message();
   }
@@ -440,7 +272,7 @@ bool ReadTable(const std::string& text, const std::string& file, const TableOpti
 
 bool IsLength(Coordinate coordinate) {
   return coordinate != Coordinate::kAngle && coordinate != Coordinate::kOmega &&
-         coordinate != Coordinate::kAlpha;
+         coordinate != Coordinate::kAlpha && !IsForce(coordinate);
 }
 
 /// A number of a clock as its whole part and the rest: in one double, times since 1970 are
@@ -481,10 +313,13 @@ long double AsWritten(double value) {
   return written;
 }
 
+// A contact's tangent is its normal turned by a right angle, in a direction that changes too.
 bool TurnsWithY(Coordinate coordinate) {
   return coordinate == Coordinate::kY || coordinate == Coordinate::kVy ||
          coordinate == Coordinate::kAngle || coordinate == Coordinate::kOmega ||
-         coordinate == Coordinate::kAy || coordinate == Coordinate::kAlpha;
+         coordinate == Coordinate::kAy || coordinate == Coordinate::kAlpha ||
+         coordinate == Coordinate::kFy || coordinate == Coordinate::kTorque ||
+         coordinate == Coordinate::kTangent;
 }
 
 /// Reads the rows of a table with a known layout.
@@ -507,7 +342,10 @@ class RowCollector {
     const Moment* const start = FindStart(moments);
     for (const Moment& moment : moments) {
       const double time = TimeOf(moment, start);
-      if (!CheckApart(moment, time) || !ReadValues(moment.row, time, moment.name)) {
+      if (!CheckApart(moment, time)) return false;
+      if (layout_.target_column == "event") {
+        if (!ReadEvent(moment.row, time, moment.name)) return false;
+      } else if (!ReadValues(moment.row, time, moment.name)) {
         return false;
       }
     }
@@ -579,11 +417,13 @@ class RowCollector {
 
   bool ReadName(int row, std::string* name) {
     if (layout_.name < 0) {
+      *name = layout_.event;
       return true;
     }
     const std::string& written = table_.rows[row][layout_.name];
     const auto place = layout_.names.find(written);
-    *name = layout_.names.empty()          ? Cleaned(written)
+    *name = layout_.names.empty()
+                ? CleanedName(written, layout_.target_column == "contact" ? ":" : "")
             : place == layout_.names.end() ? ""
                                            : place->second;
     return !layout_.names.empty() || !written.empty() || Fail(row, "expected a name, got none");
@@ -653,6 +493,23 @@ class RowCollector {
     return true;
   }
 
+  bool ReadEvent(int row, double time, const std::string& name) {
+    long& last = last_number_[name];
+    double number = static_cast<double>(last) + 1.0;
+    if (layout_.number >= 0 && !ReadCell(table_, row, layout_.number, &number, error_)) {
+      return false;
+    }
+    if (!(number > static_cast<double>(last)) || number != std::floor(number) ||
+        number > std::numeric_limits<int>::max()) {
+      return Fail(row, "number: expected an integer of at least " + std::to_string(last + 1) +
+                           ", got " + table_.rows[row][layout_.number]);
+    }
+    last = static_cast<long>(number);
+    recording_->rows.push_back({time, name, "", {}, last});
+    recording_->rows.back().values.fill(kNaN);
+    return true;
+  }
+
   bool ReadLikelihood(int row, int column, double* likelihood) {
     if (column < 0 || table_.rows[row][column].empty()) return true;
     return ReadCell(table_, row, column, likelihood, error_) &&
@@ -683,6 +540,7 @@ class RowCollector {
       layout_.time >= 0 ? AsWritten(layout_.time_scale) : 1.0L / options_.frame_rate;
   std::map<std::string, Moment> last_moment_;
   std::map<std::string, double> last_written_;
+  std::map<std::string, long> last_number_;  ///< of each event
 };
 
 void EstimateNoise(TableRecording* recording) {
@@ -734,7 +592,8 @@ bool ParseTableRecording(const std::string& text, const std::string& file,
     return false;
   }
   if (recording->rows.empty()) {
-    *error = file + ": expected at least one measured coordinate from " +
+    *error = file + ": expected at least one " +
+             (layout.target_column == "event" ? "event" : "measured coordinate") + " from " +
              CsvNumber(options.from.value_or(0.0)) + " to " + CsvNumber(options.to) +
              " s, got none";
     return false;
@@ -752,13 +611,16 @@ std::string ObservationCsv(const TableRecording& recording) {
       used[i] = used[i] || std::isfinite(row.values[i]);
     }
   }
-  std::string csv = "time," + recording.target_column + (relative ? ",relative_to" : "");
+  const bool is_event = recording.target_column == "event";
+  std::string csv = "time," + recording.target_column + (is_event ? ",number" : "") +
+                    (relative ? ",relative_to" : "");
   for (size_t i = 0; i < used.size(); ++i) {
     if (used[i]) csv += std::string(",") + NameOf(static_cast<Coordinate>(i));
   }
   csv += "\n";
   for (const TableRow& row : recording.rows) {
     csv += CsvNumber(row.time) + "," + row.name;
+    if (is_event) csv += "," + std::to_string(row.number);
     if (relative) {
       csv += "," + row.relative_to;
     }

@@ -12,7 +12,12 @@
 //                  {"time": {"column": "ms", "scale": 0.001}, "target": "point", "name": "marker",
 //                   "names": {"LED 1": "tip"}, "columns": [{"column": "X", "coordinate": "x"}]}
 //                A coordinate is scale · cell + offset. Names that `names` leaves out are left out;
-//                without it all are taken. Without `time` rows are frames.
+//                without it all are taken. Without `time` rows are frames. What is observed may
+//                also be a `joint` or a `contact` ("a:b"), with the coordinates of their forces.
+//                Times of events are those of the rows of a table of one kind of event,
+//                  {"time": "t", "event": "bounce"}
+//                or of several, {"time": "t", "target": "event", "name": "what"}; each counts from
+//                1 in the part that is read, or has its number in the column `number`.
 //   deeplabcut   three header rows (scorer, bodyparts, coords), or four with several animals
 //                (individuals); the first column is the frame. Points are named by their body part,
 //                or ANIMAL.PART. Cells below the likelihood wanted are missing data.
@@ -54,16 +59,17 @@ struct TableOptions {
   bool y_down = false;      ///< y, and with it angles, are counted downwards: they change sign
 };
 
-/// The measurements of a body or point at one time; NaN: missing.
+/// The measurements of a body, point, joint or contact at one time (NaN: missing), or an event.
 struct TableRow {
   double time = 0.0;  ///< s
   std::string name;
   std::string relative_to;  ///< empty: the world
   std::array<double, kCoordinates> values;
+  long number = 0;  ///< of an event: 1 is the first
 };
 
 struct TableRecording {
-  std::string target_column;  ///< "body" or "point"
+  std::string target_column;  ///< "body", "point", "joint", "contact" or "event"
   std::vector<TableRow> rows;
   double start = 0.0;  ///< s of the file: from here times count where they were those of a clock
   /// The standard deviation of the noise of each series, by fourth differences (recording.h).

@@ -336,6 +336,76 @@ TEST(RecordingTableTest, RefusesQuotesInsideCellsAndWhatIsNoText) {
   EXPECT_TRUE(Import("\xef\xbb\xbft,x\n0,1\n", Mapped(kOne)).ok);
 }
 
+// A load cell under a pivot, in kg, and one under a table.
+TEST(RecordingTableTest, ForcesOfJointsAndContacts) {
+  TableOptions options = Mapped(R"({"time": "t", "columns": [
+      {"column": "h", "joint": "pivot", "coordinate": "fx", "scale": 10},
+      {"column": "v", "joint": "pivot", "coordinate": "fy", "scale": 10},
+      {"column": "m", "joint": "pivot", "coordinate": "torque"}]})");
+  options.scale = 1000.0;  // of lengths
+  options.y_down = true;
+  Imported imported = Import("t,h,v,m\n0,1,2,3\n1,4,,6\n", options);
+  ASSERT_TRUE(imported.ok) << imported.error;
+  EXPECT_EQ(imported.csv, "time,joint,fx,fy,torque\n0,pivot,10,-20,-3\n1,pivot,40,,-6\n");
+  const char long_rows[] = R"({"time": "t", "target": "contact", "name": "cell",
+      "names": {"A 1": "box:floor"}, "columns": [{"column": "n", "coordinate": "normal"},
+                                                 {"column": "s", "coordinate": "tangent"}]})";
+  imported = Import("t,cell,n,s\n0,A 1,5,-1\n0,B,6,-2\n", Mapped(long_rows));
+  ASSERT_TRUE(imported.ok) << imported.error;
+  EXPECT_EQ(imported.csv, "time,contact,normal,tangent\n0,box:floor,5,-1\n");
+  const auto error = [](const std::string& column) {
+    return Import("t,n\n0,1\n",
+                  Mapped(R"({"time": "t", "columns": [{"column": "n", )" + column + "}]}"))
+        .error;
+  };
+  EXPECT_EQ(error(R"("joint": "pivot", "coordinate": "normal")"),
+            "m.json: /columns/0/coordinate: expected fx, fy or torque, got \"normal\"");
+  EXPECT_EQ(error(R"("contact": "box", "coordinate": "normal")"),
+            "m.json: /columns/0/contact: expected the names of two bodies as \"a:b\", got \"box\"");
+  EXPECT_EQ(error(R"("contact": "a:b", "coordinate": "normal", "relative_to": "c")"),
+            "m.json: /columns/0/relative_to: goes not with forces");
+  EXPECT_EQ(error(R"("body": "a", "coordinate": "fx")"),
+            "m.json: /columns/0/coordinate: expected x, y, angle, vx, vy, omega, distance, ax, ay "
+            "or alpha, got \"fx\"");
+}
+
+TEST(RecordingTableTest, TimesOfEvents) {
+  // Sounds of bounces, in ms.
+  TableOptions options = Mapped(R"({"time": {"column": "ms", "scale": 0.001}, "event": "bounce"})");
+  Imported imported = Import("ms,loudness\n250,9\n750,8\n1125,7\n", options);
+  ASSERT_TRUE(imported.ok) << imported.error;
+  EXPECT_EQ(imported.csv, "time,event,number\n0.25,bounce,1\n0.75,bounce,2\n1.125,bounce,3\n");
+  // The run begins where the part does.
+  options.from = 0.5;
+  EXPECT_EQ(Import("ms,loudness\n250,9\n750,8\n1125,7\n", options).csv,
+            "time,event,number\n0.25,bounce,1\n0.625,bounce,2\n");
+  const TableOptions several = Mapped(
+      R"({"time": "t", "target": "event", "name": "what",
+          "names": {"up": "lift", "down": "land"}})");
+  EXPECT_EQ(Import("t,what\n0.5,up\n0.5,down\n1,other\n1.5,up\n", several).csv,
+            "time,event,number\n0.5,lift,1\n0.5,land,1\n1.5,lift,2\n");
+  const TableOptions numbered = Mapped(R"({"time": "t", "event": "touch", "number": "n"})");
+  EXPECT_EQ(Import("t,n\n0.5,2\n1,5\n", numbered).csv,
+            "time,event,number\n0.5,touch,2\n1,touch,5\n");
+  EXPECT_EQ(Import("t,n\n0.5,2\n1,2\n", numbered).error,
+            "r.csv: line 3: number: expected an integer of at least 3, got 2");
+  EXPECT_EQ(Import("t,n\n0.5,1.5\n", numbered).error,
+            "r.csv: line 2: number: expected an integer of at least 1, got 1.5");
+  EXPECT_EQ(Import("t,n\n1,1\n0.5,2\n", numbered).error,
+            "r.csv: line 3: time: expected one after 1 s, got 0.5: the clock stands still or runs "
+            "backwards");
+  const auto error = [](const std::string& rest) {
+    return Import("t,n\n0,1\n", Mapped(R"({"time": "t", )" + rest + "}")).error;
+  };
+  EXPECT_EQ(error(R"("event": "touch", "columns": [])"),
+            "m.json: /columns: goes not with events, whose times are those of the rows");
+  EXPECT_EQ(error(R"("event": "touch", "target": "event", "name": "n")"),
+            "m.json: /event: goes not with name, which says what a row is");
+  EXPECT_EQ(error(R"("number": "n", "columns": [])"), "m.json: /number: goes with events");
+  EXPECT_EQ(Import("t,n\n0,1\n", Mapped(R"({"event": "touch"})")).error,
+            "m.json: expected time, the column of the events' times, got none");
+}
+
 TEST(RecordingTableTest, MistakesAreOneLine) {
   const std::string good = "t [s],th1,om1,th2\n0,2,3,4\n0.5,5,6,7\n";
   EXPECT_EQ(Import("t [s],th1,om1,th2\n0,2,3,4\n0.5,2,3,4\n0.25,2,3,4\n", Mapped(kWide)).error,
@@ -356,15 +426,16 @@ TEST(RecordingTableTest, MistakesAreOneLine) {
   EXPECT_EQ(mapping(R"({"column": "th1", "body": "a", "coordinate": "angle", "scale": 0})"),
             "m.json: /columns/0/scale: expected a number other than 0, got 0");
   EXPECT_EQ(mapping(R"({"column": "th1", "coordinate": "angle"})"),
-            "m.json: /columns/0: expected a body or a point, got both or neither");
+            "m.json: /columns/0: expected one of body, point, joint and contact, got none");
   EXPECT_EQ(mapping(R"({"column": "th1", "body": "a", "coordinate": "z"})"),
             "m.json: /columns/0/coordinate: expected x, y, angle, vx, vy, omega, distance, ax, ay "
             "or alpha, got "
             "\"z\"");
-  EXPECT_EQ(mapping(R"({"column": "th1", "body": "a", "coordinate": "angle"},
+  EXPECT_EQ(
+      mapping(R"({"column": "th1", "body": "a", "coordinate": "angle"},
                        {"column": "th2", "point": "b", "coordinate": "angle"})"),
-            "m.json: /columns/1/point: expected all columns to be of bodies, or all of points: an "
-            "observation file has one kind");
+      "m.json: /columns/1/point: expected all columns to be of bodies, or all of points, joints "
+      "or contacts: an observation file has one kind");
   EXPECT_EQ(mapping(R"({"column": "th1", "body": "a", "coordinate": "angle"},
                        {"column": "th2", "body": "a", "coordinate": "angle"})"),
             "r.csv: line 2: expected angle of a once, got it twice");
