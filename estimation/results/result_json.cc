@@ -54,6 +54,9 @@ OrderedJson ParametersToJson(const RecordingsProblem& problem, const FitResult& 
     } else {
       parameter["interval_95"] = nullptr;
     }
+    if (k < uncertainty.drift_p_value.size() && std::isfinite(uncertainty.drift_p_value[k])) {
+      parameter["drift_p_value"] = uncertainty.drift_p_value[k];
+    }
     if (uncertainty.prior_share[k] > 0.0) {
       parameter["prior_share"] = Number(uncertainty.prior_share[k]);
     }

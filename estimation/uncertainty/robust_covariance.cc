@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "tangible/estimation/uncertainty/decomposition.h"
+#include "tangible/estimation/uncertainty/drift.h"
 #include "tangible/estimation/uncertainty/tolerances.h"
 #include "tangible/math/decompositions.h"
 #include "tangible/math/median.h"
@@ -242,7 +243,7 @@ bool Jackknife(const std::vector<Reduced>& reduced, const std::vector<RecordingR
                const RobustOptions& options, RobustCovariance* result) {
   const Eigen::Index size = normal.rows();
   const double count = static_cast<double>(recordings.size());
-  RowMatrixXd sum = RowMatrixXd::Zero(size, size);
+  RowMatrixXd all_moved(static_cast<Eigen::Index>(reduced.size()), size);
   Eigen::VectorXd weights = Eigen::VectorXd::Zero(size);
   Eigen::VectorXd squares = Eigen::VectorXd::Zero(size);
   const Eigen::VectorXd length = information.diagonal().cwiseMax(0.0).cwiseSqrt();
@@ -266,17 +267,23 @@ bool Jackknife(const std::vector<Reduced>& reduced, const std::vector<RecordingR
     if (qr.rank() < size) {
       return false;
     }
-    Eigen::VectorXd moved = qr.Solve(score);
+    const Eigen::VectorXd moved = qr.Solve(score);
     for (Eigen::Index k = 0; k < size; ++k) {
-      moved[k] *= length[k] > 0.0 ? 1.0 / length[k] : 1.0;
+      all_moved(static_cast<Eigen::Index>(i), k) =
+          moved[k] * (length[k] > 0.0 ? 1.0 / length[k] : 1.0);
     }
-    sum += moved * moved.transpose();
     const Eigen::VectorXd w = (normal * g.information * normal).diagonal();
     weights += w;
     squares += w.cwiseAbs2();
   }
+  RowMatrixXd sum = RowMatrixXd::Zero(size, size);
+  for (const auto& moved : all_moved.rowwise()) sum += moved.transpose() * moved;
   result->method = RobustMethod::kRecordings;
   result->shared = (count - 1.0) / count * sum;
+  result->drift_p_value.resize(size);
+  for (Eigen::Index k = 0; k < size; ++k) {
+    result->drift_p_value[k] = DriftProbability(all_moved.col(k));
+  }
   result->shared_freedom =
       (weights.cwiseAbs2().cwiseQuotient(squares).array() - 1.0).max(1.0).matrix();
   return true;

@@ -85,7 +85,10 @@ struct RobustCovariance {
   RobustMethod method = RobustMethod::kNone;
   RowMatrixXd shared;              ///< V; directions that are not determined have no part in it
   Eigen::VectorXd shared_freedom;  ///< ν
-  std::vector<RowMatrixXd> own;    ///< of each recording
+  /// Of each shared parameter, by what leaving out each recording moves (drift.h); empty unless
+  /// recordings are the clusters.
+  Eigen::VectorXd drift_p_value;
+  std::vector<RowMatrixXd> own;  ///< of each recording
   std::vector<Eigen::VectorXd> own_freedom;
   double bandwidth = 0.0;  ///< S, s, the largest of a recording; 0: no autocorrelation counts
 };

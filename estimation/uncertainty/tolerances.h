@@ -37,6 +37,9 @@ inline constexpr double kChiSquareDeviations = 5.0;
 /// Of 1, a probability: residuals count as correlated where white residuals have such a correlation
 /// with a smaller probability.
 inline constexpr double kWhitenessProbability = 1e-4;
+/// Of 1, a probability, over the number of parameters: a parameter counts as drifting where
+/// recordings that can be exchanged have such sums with a smaller probability.
+inline constexpr double kDriftProbability = 1e-3;
 /// Of perfect correlation from one sample to the next: below it intervals change by less than 10 %,
 /// so that the correlation does not matter.
 inline constexpr double kWhitenessCorrelation = 0.1;

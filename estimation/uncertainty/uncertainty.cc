@@ -73,6 +73,7 @@ class Estimator {
     result_.standard_deviation = Eigen::VectorXd::Constant(size, kNaN);
     result_.standard_deviation_robust = Eigen::VectorXd::Constant(size, kNaN);
     result_.degrees_of_freedom = Eigen::VectorXd::Constant(size, kNaN);
+    result_.drift_p_value = Eigen::VectorXd::Constant(size, kNaN);
     result_.prior_share = Eigen::VectorXd::Zero(size);
     result_.confidence_95.resize(entries_.size());
     result_.confidence_95_robust.resize(entries_.size());
@@ -396,11 +397,13 @@ class Estimator {
     const RobustCovariance robust =
         EstimateRobustCovariance(recordings, prior, {options_.huber, options_.rank_tolerance});
     result_.robust_method = robust.method;
+    result_.num_recordings = static_cast<int>(recordings.size());
     result_.bandwidth = robust.bandwidth;
     if (robust.method == RobustMethod::kNone) {
       return;
     }
     FillRobustIntervals(shared_, robust.shared, robust.shared_freedom);
+    WarnOfDrift(robust.drift_p_value);
     std::vector<RowMatrixXd> own(parts_.size());
     for (size_t g = 0; g < of_recordings.size(); ++g) {
       own[of_recordings[g]] = robust.own[g];
@@ -408,6 +411,25 @@ class Estimator {
     }
     Spread(
         robust.shared, [&](size_t b) { return own[b]; }, &robust_);
+  }
+
+  // Many parameters are tested, of which chance lets some seem to drift.
+  void WarnOfDrift(const Eigen::VectorXd& p_values) {
+    const double least =
+        kDriftProbability / static_cast<double>(std::max<size_t>(1, shared_.size()));
+    for (Eigen::Index i = 0; i < p_values.size(); ++i) {
+      const int k = shared_[static_cast<size_t>(i)];
+      result_.drift_p_value[k] = p_values[i];
+      if (!(p_values[i] < least) || !result_.messages[k].empty()) continue;
+      result_.warnings.push_back(
+          "'" + entries_[k].name +
+          "' drifts over the recordings in their order (probability by "
+          "chance " +
+          (p_values[i] > kLeastProbability ? CompactNumber(p_values[i], 3)
+                                           : "below " + CompactNumber(kLeastProbability, 3)) +
+          "): its interval holds for the mean over these recordings and not for later ones; "
+          "let it vary (\"per\": \"recording\") and look at its course");
+    }
   }
 
   void FillRobustIntervals(const std::vector<int>& parameters, const RowMatrixXd& covariance,
@@ -519,7 +541,10 @@ std::string DescribeRobust(const Uncertainty& uncertainty) {
       return "robust intervals: jackknife over the recordings, Student's t";
     case RobustMethod::kTime:
       return "robust intervals: residuals as they are, correlated over " +
-             CompactNumber(uncertainty.bandwidth, 3) + " s, Student's t";
+             CompactNumber(uncertainty.bandwidth, 3) + " s, Student's t" +
+             (uncertainty.num_recordings == 1
+                  ? "; what differs from recording to recording is not in those of one"
+                  : "");
   }
   return "";
 }

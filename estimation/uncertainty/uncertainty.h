@@ -64,7 +64,11 @@ struct Uncertainty : ResidualQuality {
   Eigen::VectorXd standard_deviation_robust;  ///< NaN: none
   Eigen::VectorXd degrees_of_freedom;         ///< of Student's t of the robust interval; NaN: none
   std::vector<ConfidenceInterval> confidence_95_robust;
+  /// Of each shared parameter: the probability of such a drift over the recordings, or a larger
+  /// one, if they can be exchanged (drift.h); NaN: not tested.
+  Eigen::VectorXd drift_p_value;
   RobustMethod robust_method = RobustMethod::kNone;
+  int num_recordings = 0;       ///< with observations, from which robust intervals are
   double bandwidth = 0.0;       ///< s, over which residuals count as correlated; 0: not at all
   Eigen::VectorXd prior_share;  ///< of a parameter's information, 0 to 1: what priors contribute
   /// The combinations that are determined of parameters that are not determined one by one.
