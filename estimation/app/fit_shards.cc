@@ -11,13 +11,39 @@
 namespace tangible {
 namespace {
 
-/// How many rows a fit has: starts, or profiles.
-long RowsOf(const FitOptions& options) {
+/// How many rows a fit has: chains, starts, or profiles.
+long RowsOf(const FitOptions& options, int chains) {
+  if (chains > 0) return chains;
   return NumStarts(options) > 1 ? NumStarts(options) : static_cast<long>(options.profiles.size());
 }
 
 std::string NothingToDivide() {
-  return "expected a fit with \"starts\" above 1, or --profile, as these are divided; got neither";
+  return "expected a fit with \"starts\" above 1, --profile or --posterior, as these are divided; "
+         "got "
+         "none of them";
+}
+
+/// The rows of a shard that are chains; what is wrong or empty.
+std::string WriteChains(const ChainsOfFit& chains, const Shard& shard, const std::string& out) {
+  std::vector<int> numbers;
+  for (long i = 0; i < shard.NumRows(chains.count); ++i) {
+    numbers.push_back(static_cast<int>(shard.RowOf(i)));
+  }
+  std::vector<FinishedChain> made;
+  std::string error = numbers.empty() ? "" : chains.make(numbers, &made);
+  if (!error.empty()) return error;
+  OrderedJson json = {{"chains", OrderedJson::array()}};
+  for (size_t i = 0; i < made.size(); ++i) {
+    json["chains"].push_back({{"chain", numbers[i]},
+                              {"draws", made[i].costs.size()},
+                              {"divergences", made[i].divergences},
+                              {"step", made[i].step}});
+  }
+  // Without an estimate there are no chains to take over.
+  std::vector<std::optional<FinishedChain>> rows(numbers.size());
+  for (size_t i = 0; i < made.size(); ++i) rows[i] = std::move(made[i]);
+  json["shard"] = ShardJson(shard, chains.count, ToRows(rows));
+  return WriteResult(out, JsonText(json));
 }
 
 /// What is said of the rows of a shard: where starts ended, and which profiles there are.
@@ -46,10 +72,12 @@ OrderedJson Told(const std::vector<std::optional<FinishedStart>>& starts,
 
 }  // namespace
 
-std::string WriteFitShard(const FitOptions& options, const ShardPlan& plan, const std::string& out,
+std::string WriteFitShard(const FitOptions& options, const ChainsOfFit& chains,
+                          const ShardPlan& plan, const std::string& out,
                           RecordingsProblem* problem) {
-  const long rows_in_all = RowsOf(options);
+  const long rows_in_all = RowsOf(options, chains.count);
   if (rows_in_all == 0) return "--shard: " + NothingToDivide();
+  if (chains.count > 0) return WriteChains(chains, plan.shard, out);
   const long rows = plan.shard.NumRows(rows_in_all);
   std::vector<std::optional<FinishedStart>> starts;
   std::vector<std::optional<FinishedProfile>> profiles;
@@ -75,12 +103,21 @@ std::string WriteFitShard(const FitOptions& options, const ShardPlan& plan, cons
   return WriteResult(out, JsonText(json));
 }
 
-std::string MergeFitShards(const FitOptions& options, const ShardPlan& plan, FitParts* parts) {
-  const long rows_in_all = RowsOf(options);
+std::string MergeFitShards(const FitOptions& options, int chains, const ShardPlan& plan,
+                           FitParts* parts) {
+  const long rows_in_all = RowsOf(options, chains);
   if (rows_in_all == 0) return "--merge: " + NothingToDivide();
   MergedShards merged;
   std::string error = MergeShards(plan, rows_in_all, &merged);
   if (!error.empty()) return error;
+  if (chains > 0) {
+    std::vector<std::optional<FinishedChain>> made;
+    if (!FromRows(merged.rows, &made, &error)) return error;
+    for (size_t i = 0; i < made.size(); ++i) {
+      if (made[i]) parts->chains[static_cast<int>(i)] = std::move(*made[i]);
+    }
+    return "";
+  }
   if (NumStarts(options) > 1) {
     std::vector<std::optional<FinishedStart>> starts;
     if (!FromRows(merged.rows, &starts, &error)) return error;

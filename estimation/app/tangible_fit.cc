@@ -37,6 +37,7 @@
 #include "tangible/estimation/results/prediction.h"
 #include "tangible/estimation/results/report.h"
 #include "tangible/estimation/results/residual_summary.h"
+#include "tangible/math/shared_work.h"
 #include "tangible/scene/json_reader.h"
 #include "tangible/scene/text_file.h"
 
@@ -110,15 +111,18 @@ std::string OpenCheckpoint(const FitInput& input, std::unique_ptr<FitCheckpoint>
     return WriteFileAtomically(FLAGS_checkpoint, text, Over::kOwnInput);
   });
   std::error_code none;
-  if (std::filesystem::exists(FLAGS_checkpoint, none)) {
-    if (!std::filesystem::is_regular_file(FLAGS_checkpoint, none)) {
-      return FLAGS_checkpoint + ": cannot be written: expected a file, got a device or pipe";
-    }
-    std::string text;
-    std::string error;
-    if (!ReadTextFile(FLAGS_checkpoint, &text, &error)) {
-      return error;
-    }
+  const bool exists = std::filesystem::exists(FLAGS_checkpoint, none);
+  if (exists && !std::filesystem::is_regular_file(FLAGS_checkpoint, none)) {
+    return FLAGS_checkpoint + ": cannot be written: expected a file, got a device or pipe";
+  }
+  // A rank that is not the first asks that one for the file, and goes on from it like all others.
+  const SharedWork* const work = SharedWork::Current();
+  const bool asks = work != nullptr && work->rank() > 0;
+  std::string text;
+  std::string error;
+  const bool read = (exists || asks) && ReadTextFile(FLAGS_checkpoint, &text, &error);
+  if (exists && !asks && !read) return error;
+  if (read) {
     // It is not written again before there is something new: with what a restart takes the fit
     // would not get on where it is often ended.
     return (*checkpoint)->Restore(text, FLAGS_checkpoint);
@@ -456,8 +460,31 @@ MotionCheck CompareMotion(const Prepared& prepared, const FitResult& result) {
   return check;
 }
 
+/// The chains of a shard of --posterior, around the estimate of the whole fit.
+ChainsOfFit ChainsOf(Prepared* prepared) {
+  if (!prepared->sampling) return {};
+  return {prepared->sampling->chains,
+          [prepared](const std::vector<int>& numbers, std::vector<FinishedChain>* chains) {
+            const FitOptions& options = prepared->fit.input.options();
+            VarianceComponents components;
+            const FitResult result =
+                FitWithComponents(options, prepared->problem.get(), {}, &components, {});
+            ScaleObservations(components.noise, prepared);
+            if (result.estimate.size() == 0) return std::string();
+            const RecordingsProblem& problem = *prepared->problem;
+            std::string error;
+            const bool made =
+                MakeChains(*prepared->sampling, options, result,
+                           FreeCoordinates(problem.entries(), problem.effects()),
+                           MakerOf(prepared->fit.input, problem), numbers, chains, &error);
+            // What is wrong is said by the merge, with the fit.
+            if (!made) chains->clear();
+            return std::string();
+          }};
+}
+
 /// Draws from the posterior, whose intervals become those of the result; what is wrong or empty.
-std::string Sample(const Prepared& prepared, FitResult* result,
+std::string Sample(const Prepared& prepared, const FitParts& parts, FitResult* result,
                    std::optional<Posterior>* posterior) {
   const RecordingsProblem& problem = *prepared.problem;
   const PosteriorOptions& options = *prepared.sampling;
@@ -468,7 +495,7 @@ std::string Sample(const Prepared& prepared, FitResult* result,
           options, prepared.fit.input.options(), *result,
           FreeCoordinates(problem.entries(), problem.effects()),
           MakerOf(prepared.fit.input, problem), [&progress](long done) { progress.Show(done); },
-          &made, &error)) {
+          parts.chains, &made, &error)) {
     return "--posterior: " + error;
   }
   TakeIntervals(made, result);
@@ -511,12 +538,13 @@ int Run(const std::string& text, const std::string& file, const ShardPlan& plan)
   const FitOptions& options = prepared.fit.input.options();
   std::string error = plan.part != ShardPlan::Part::kAll ? HashInputs() : "";
   if (error.empty() && plan.IsShard()) {
-    error = WriteFitShard(options, plan, FLAGS_out, prepared.problem.get());
+    error = WriteFitShard(options, ChainsOf(&prepared), plan, FLAGS_out, prepared.problem.get());
     return error.empty() ? kExitDone : ReportError(error);
   }
   FitParts parts;
   FitPartLogs logs(&parts);
-  if (error.empty() && plan.IsMerge()) error = MergeFitShards(options, plan, &parts);
+  if (error.empty() && plan.IsMerge())
+    error = MergeFitShards(options, ChainsOf(&prepared).count, plan, &parts);
   if (!error.empty()) return ReportError(error);
   IterationPrinter printer(prepared.problem->entries());
   const FitProgress progress = [&](int start, int iteration, const FitIteration& values) {
@@ -537,7 +565,7 @@ int Run(const std::string& text, const std::string& file, const ShardPlan& plan)
   const bool estimated = result.estimate.size() > 0;
   std::optional<Posterior> posterior;
   std::string unsampled;
-  if (estimated && prepared.sampling) unsampled = Sample(prepared, &result, &posterior);
+  if (estimated && prepared.sampling) unsampled = Sample(prepared, parts, &result, &posterior);
   if (estimated) {
     PrintResult(prepared, result, components);
   }
@@ -591,7 +619,9 @@ std::string CheckShardFlags(ShardPlan* plan) {
   if (!FLAGS_checkpoint.empty()) return "--checkpoint: not with --shard or --merge";
   for (const auto& [flag, path] : {std::pair("--report", &FLAGS_report),
                                    {"--predictions", &FLAGS_predictions},
-                                   {"--scene_out", &FLAGS_scene_out}}) {
+                                   {"--scene_out", &FLAGS_scene_out},
+                                   {"--posterior_samples", &FLAGS_posterior_samples},
+                                   {"--posterior_bands", &FLAGS_posterior_bands}}) {
     if (plan->IsShard() && !path->empty()) {
       return std::string(flag) + ": not with --shard; --merge writes it";
     }
@@ -621,6 +651,7 @@ int Main(int argc, char** argv) {
        .outputs = {"out", "report", "scene_out", "predictions", "checkpoint", "posterior_samples",
                    "posterior_bands"},
        .inputs = {"design"},
+       .runs_in_step = true,
        .schema = [] { return JsonText(FitSchema()); }});
   if (line.exit_status) return *line.exit_status;
   if (FLAGS_max_iterations < 1) {

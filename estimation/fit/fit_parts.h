@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Parts of a fit that other processes do: starts, and profiles that are asked for. Both depend on
-// the problem alone and on no other start or profile, so that a fit that takes them over has the
-// bits of one that does all itself. The recordings of one fit are no such parts: each evaluation
-// needs all of them.
+// Parts of a fit that other processes do: starts, profiles that are asked for, and chains of draws
+// from the posterior. They depend on the problem alone and on no other of them, so that a fit that
+// takes them over has the bits of one that does all itself. The recordings of one fit are no such
+// parts: each evaluation needs all of them.
 
 #include <Eigen/Core>
 #include <deque>
@@ -42,6 +42,19 @@ struct FinishedProfile {
   long rollouts = 0;
 };
 
+/// A chain of draws from the posterior around an estimate (posterior.h).
+struct FinishedChain {
+  Eigen::VectorXd estimate;
+  Eigen::MatrixXd parameters;  ///< of each draw, a row each
+  Eigen::VectorXd costs;       ///< of these
+  int divergences = 0;
+  int saturated = 0;
+  double step = 0.0;
+  double acceptance = 0.0;
+  long evaluations = 0;
+  std::string message;  ///< why there are no draws, or empty
+};
+
 /// What a fit takes over instead of doing it.
 struct FitParts {
   std::map<int, FinishedStart> starts;  ///< by number; of the first of several fits
@@ -51,6 +64,7 @@ struct FitParts {
   /// else is found out about the estimate.
   std::function<bool(const std::string& name)> is_wanted{};
   std::map<std::string, FinishedProfile> made{};
+  std::map<int, FinishedChain> chains{};  ///< by number. One around another estimate is not taken
 };
 
 /// The logs of fits that follow each other (variance_components.h) and take over parts.
@@ -176,6 +190,21 @@ void VisitFields(FinishedProfile& profile, const Visitor& visit) {
   visit("profile", found);
   visit("better", better);
   visit("rollouts", rollouts);
+}
+
+template <typename Visitor>
+void VisitFields(FinishedChain& chain, const Visitor& visit) {
+  auto& [estimate, parameters, costs, divergences, saturated, step, acceptance, evaluations,
+         message] = chain;
+  visit("estimate", estimate);
+  visit("parameters", parameters);
+  visit("costs", costs);
+  visit("divergences", divergences);
+  visit("saturated", saturated);
+  visit("step", step);
+  visit("acceptance", acceptance);
+  visit("evaluations", evaluations);
+  visit("message", message);
 }
 
 }  // namespace tangible

@@ -2,12 +2,14 @@
 #include "tangible/estimation/fit/linearisation.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
+#include <cstring>
+#include <numeric>
 #include <utility>
 
 #include "tangible/lcp/contact/worker_pool.h"
 #include "tangible/math/decompositions.h"
+#include "tangible/math/shared_work.h"
 
 namespace tangible {
 namespace {
@@ -88,6 +90,87 @@ class Unpacker {
   const Eigen::VectorXd& numbers_;
   Eigen::Index at_ = 0;
 };
+
+/// How the evaluation of a block went.
+struct BlockOutcome {
+  bool done = false;
+  long rollouts = 0;
+  std::string message;
+};
+
+/// Bytes for processes of the same program on machines of one kind.
+class ByteWriter {
+ public:
+  template <typename T>
+  void Add(const T& value) {
+    const size_t at = bytes_.size();
+    bytes_.resize(at + sizeof(T));
+    std::memcpy(bytes_.data() + at, &value, sizeof(T));
+  }
+  template <typename T>
+  void Add(const T* values, size_t count) {
+    Add(count);
+    const size_t at = bytes_.size();
+    bytes_.resize(at + count * sizeof(T));
+    if (count > 0) std::memcpy(bytes_.data() + at, values, count * sizeof(T));
+  }
+  const std::string& bytes() const { return bytes_; }
+
+ private:
+  std::string bytes_;
+};
+
+class ByteReader {
+ public:
+  explicit ByteReader(const std::string& bytes) : bytes_(bytes) {}
+  template <typename T>
+  T One() {
+    T value;
+    std::memcpy(&value, bytes_.data() + at_, sizeof(T));
+    at_ += sizeof(T);
+    return value;
+  }
+  template <typename T>
+  std::vector<T> Some() {
+    std::vector<T> values(One<size_t>());
+    if (!values.empty()) std::memcpy(values.data(), bytes_.data() + at_, values.size() * sizeof(T));
+    at_ += values.size() * sizeof(T);
+    return values;
+  }
+
+ private:
+  const std::string& bytes_;
+  size_t at_ = 0;
+};
+
+/// Whether processes may divide the blocks: what a problem keeps of the random forces of a block
+/// (process_noise.h) others would not have.
+bool CanDivide(const LeastSquaresProblem& problem) {
+  for (int block = 0; block < problem.num_blocks(); ++block) {
+    if (problem.num_noise_rows(block) > 0) return false;
+  }
+  return problem.num_blocks() > 1;
+}
+
+/// The process that evaluates each block: the longest first, each by the one that has the fewest
+/// rows so far.
+std::vector<int> OwnersOf(const BlockLayout& layout, int processes) {
+  const auto count = static_cast<size_t>(layout.num_blocks());
+  const auto rows = [&](int block) {
+    return layout.row_offset(block + 1) - layout.row_offset(block);
+  };
+  std::vector<int> order(count);
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return rows(a) > rows(b); });
+  std::vector<long> loads(static_cast<size_t>(processes), 0);
+  std::vector<int> owners(count);
+  for (const int block : order) {
+    const auto least = std::min_element(loads.begin(), loads.end());
+    owners[block] = static_cast<int>(least - loads.begin());
+    *least += rows(block) + 1;
+  }
+  return owners;
+}
 
 /// Row i of [A B], from that of [shared | own].
 template <typename Row>
@@ -170,36 +253,89 @@ Linearizer::Linearizer(LeastSquaresProblem* problem, GradientMethod method, int 
     : problem_(problem), layout_(*problem), method_(method), threads_(threads), log_(log) {}
 
 bool Linearizer::EvaluateBlocks(const Eigen::VectorXd& p, BlockDerivatives derivatives,
-                                const std::function<void(int, BlockEvaluation*)>& use) {
+                                const BlockUse& use) {
   const int count = layout_.num_blocks();
-  std::vector<std::string> messages(static_cast<size_t>(count));
-  std::vector<char> done(static_cast<size_t>(count), 0);
-  std::atomic<long> rollouts{0};
+  SharedWork* const work = CanDivide(*problem_) ? SharedWork::Current() : nullptr;
+  const std::vector<int> owners = work != nullptr ? OwnersOf(layout_, work->size())
+                                                  : std::vector<int>(static_cast<size_t>(count), 0);
+  const int rank = work != nullptr ? work->rank() : 0;
+  std::vector<BlockOutcome> outcomes(static_cast<size_t>(count));
   ForEachOnThreads(threads_, count, [&](int block) {
+    if (owners[block] != rank) return;
     BlockEvaluation evaluation;
-    done[block] =
-        problem_->EvaluateBlock(block, layout_.Local(block, p), method_, derivatives, &evaluation)
-            ? 1
-            : 0;
-    rollouts += evaluation.rollouts;
-    if (done[block] != 0) {
-      use(block, &evaluation);
+    BlockOutcome& outcome = outcomes[block];
+    outcome.done =
+        problem_->EvaluateBlock(block, layout_.Local(block, p), method_, derivatives, &evaluation);
+    outcome.rollouts = evaluation.rollouts;
+    if (outcome.done) {
+      use.take(block, &evaluation);
     } else {
-      messages[block] = problem_->BlockName(block) + evaluation.message;
+      outcome.message = problem_->BlockName(block) + evaluation.message;
     }
   });
-  rollouts_ += rollouts;
-  const auto failed = std::find(done.begin(), done.end(), 0);
-  message_ = failed == done.end() ? "" : messages[failed - done.begin()];
-  return failed == done.end();
+  if (work != nullptr) {
+    ByteWriter own;
+    for (int block = 0; block < count; ++block) {
+      const BlockOutcome& outcome = outcomes[block];
+      if (owners[block] != rank) continue;
+      own.Add(outcome.done);
+      own.Add(outcome.rollouts);
+      own.Add(outcome.message.data(), outcome.message.size());
+      const Eigen::VectorXd numbers = outcome.done ? use.numbers(block) : Eigen::VectorXd();
+      own.Add(numbers.data(), static_cast<size_t>(numbers.size()));
+    }
+    const std::vector<std::string> all = work->Exchange(own.bytes());
+    std::vector<ByteReader> readers(all.begin(), all.end());
+    for (int block = 0; block < count; ++block) {
+      if (owners[block] == rank) continue;
+      ByteReader& reader = readers[owners[block]];
+      BlockOutcome& outcome = outcomes[block];
+      outcome.done = reader.One<bool>();
+      outcome.rollouts = reader.One<long>();
+      const std::vector<char> message = reader.Some<char>();
+      outcome.message.assign(message.begin(), message.end());
+      const std::vector<double> numbers = reader.Some<double>();
+      if (outcome.done) {
+        use.set(block, Eigen::Map<const Eigen::VectorXd>(
+                           numbers.data(), static_cast<Eigen::Index>(numbers.size())));
+      }
+    }
+  }
+  message_.clear();
+  bool done = true;
+  for (const BlockOutcome& outcome : outcomes) {
+    rollouts_ += outcome.rollouts;
+    if (done && !outcome.done) message_ = outcome.message;
+    done = done && outcome.done;
+  }
+  return done;
 }
 
 bool Linearizer::Rows(const Eigen::VectorXd& p, BlockDerivatives derivatives,
                       std::vector<BlockEvaluation>* blocks) {
   blocks->assign(static_cast<size_t>(layout_.num_blocks()), {});
-  return EvaluateBlocks(p, derivatives, [blocks](int block, BlockEvaluation* evaluation) {
+  BlockUse use;
+  use.take = [blocks](int block, BlockEvaluation* evaluation) {
     (*blocks)[block] = std::move(*evaluation);
-  });
+  };
+  use.numbers = [blocks](int block) {
+    const BlockEvaluation& evaluation = (*blocks)[block];
+    Packer pack;
+    pack.Add(static_cast<double>(evaluation.rollouts));
+    pack.Add(RowMatrixXd(evaluation.residuals));
+    pack.Add(static_cast<double>(evaluation.jacobian.cols()));
+    pack.Add(evaluation.jacobian);
+    return pack.numbers();
+  };
+  use.set = [blocks](int block, const Eigen::VectorXd& numbers) {
+    BlockEvaluation& evaluation = (*blocks)[block];
+    Unpacker unpack(numbers);
+    evaluation.rollouts = static_cast<long>(unpack.Number());
+    evaluation.residuals = unpack.Matrix(1);
+    const auto columns = static_cast<Eigen::Index>(unpack.Number());
+    evaluation.jacobian = unpack.Matrix(columns);
+  };
+  return EvaluateBlocks(p, derivatives, use);
 }
 
 Eigen::VectorXd Linearizer::Numbers(int block, const BlockEvaluation& evaluation,
@@ -230,10 +366,13 @@ bool Linearizer::Compute(const Eigen::VectorXd& q, const HuberBounds& huber,
   const Eigen::VectorXd q_scale = ParametersByInternal(entries(), p);
   problem_->SetHuber(huber.current);
   std::vector<Eigen::VectorXd> blocks(static_cast<size_t>(layout_.num_blocks()));
-  if (!EvaluateBlocks(p, derivatives, [&](int block, BlockEvaluation* evaluation) {
-        blocks[block] =
-            Numbers(block, *evaluation, layout_.Local(block, q_scale), huber, derivatives);
-      })) {
+  BlockUse use;
+  use.take = [&](int block, BlockEvaluation* evaluation) {
+    blocks[block] = Numbers(block, *evaluation, layout_.Local(block, q_scale), huber, derivatives);
+  };
+  use.numbers = [&](int block) { return blocks[block]; };
+  use.set = [&](int block, const Eigen::VectorXd& numbers_of) { blocks[block] = numbers_of; };
+  if (!EvaluateBlocks(p, derivatives, use)) {
     return false;
   }
   Packer pack;

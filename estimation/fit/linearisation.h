@@ -99,9 +99,15 @@ class Linearizer {
                           BlockDerivatives derivatives) const;
   bool Logged(const Eigen::VectorXd& q, const HuberBounds& huber, BlockDerivatives derivatives,
               Eigen::VectorXd* numbers);
-  /// Of the blocks, in their order; false and the message of the first that failed.
-  bool EvaluateBlocks(const Eigen::VectorXd& p, BlockDerivatives derivatives,
-                      const std::function<void(int block, BlockEvaluation*)>& use);
+  /// What is made of the blocks' evaluations, and its numbers to and from other processes.
+  struct BlockUse {
+    std::function<void(int block, BlockEvaluation*)> take;
+    std::function<Eigen::VectorXd(int block)> numbers;
+    std::function<void(int block, const Eigen::VectorXd& numbers)> set;
+  };
+  /// Of the blocks, in their order; false and the message of the first that failed. Processes that
+  /// run in step divide the blocks (math/shared_work.h).
+  bool EvaluateBlocks(const Eigen::VectorXd& p, BlockDerivatives derivatives, const BlockUse& use);
 
   LeastSquaresProblem* problem_;
   BlockLayout layout_;

@@ -276,7 +276,14 @@ void AddWarnings(const std::vector<ParameterEntry>& entries, const FitResult& re
   }
 }
 
-/// All chains, on several threads.
+/// Where chains begin, and their first mass matrix.
+struct ChainSetup {
+  Eigen::VectorXd middle;  ///< near the estimate, as x
+  double highest = 0.0;    ///< the logarithm of the density there
+  Eigen::MatrixXd factor;  ///< L of nuts.h
+};
+
+/// Chains, on several threads.
 class ChainRunner {
  public:
   ChainRunner(const PosteriorOptions& options, const FitOptions& fit,
@@ -284,18 +291,16 @@ class ChainRunner {
               const std::function<void(long)>& show)
       : options_(options), fit_(fit), coordinates_(coordinates), maker_(maker), show_(show) {}
 
-  void Run(const Eigen::VectorXd& middle, double highest, const Eigen::MatrixXd& factor,
-           std::vector<NutsChain>* chains, std::vector<Eigen::VectorXd>* costs,
-           std::vector<Eigen::MatrixXd>* parameters) {
-    const auto count = static_cast<size_t>(options_.chains);
-    chains->resize(count);
-    costs->resize(count);
-    parameters->resize(count);
+  std::vector<FinishedChain> Run(const ChainSetup& setup, const Eigen::VectorXd& estimate,
+                                 const std::vector<int>& numbers) {
+    std::vector<FinishedChain> chains(numbers.size());
     const int threads = NumThreads(options_.threads);
-    const int inner = std::max(1, threads / options_.chains);
-    ForEachOnThreads(threads, options_.chains, [&](int chain) {
+    const int count = static_cast<int>(numbers.size());
+    const int inner = std::max(1, threads / std::max(1, count));
+    ForEachOnThreads(threads, count, [&](int at) {
+      const int number = numbers[static_cast<size_t>(at)];
       PosteriorDensity density(maker_(), fit_, coordinates_, inner);
-      RandomStream random(options_.seed, static_cast<std::uint32_t>(chain));
+      RandomStream random(options_.seed, static_cast<std::uint32_t>(number));
       NutsOptions nuts;
       nuts.warm_up = options_.warm_up;
       nuts.draws = DrawsOfChain(options_);
@@ -309,19 +314,26 @@ class ChainRunner {
                                              Eigen::VectorXd* gradient) {
         return density(x, value, gradient);
       };
-      const Eigen::VectorXd start = StartOf(middle, highest, factor, &density, &random);
-      NutsChain& made = (*chains)[chain];
-      made = SampleNuts(function, start, factor, nuts, &random);
-      Eigen::VectorXd& cost = (*costs)[chain];
-      cost.resize(made.draws.rows());
-      Eigen::MatrixXd& p = (*parameters)[chain];
-      p.resize(made.draws.rows(), made.draws.cols());
-      for (Eigen::Index i = 0; i < cost.size(); ++i) {
+      const Eigen::VectorXd start =
+          StartOf(setup.middle, setup.highest, setup.factor, &density, &random);
+      const NutsChain made = SampleNuts(function, start, setup.factor, nuts, &random);
+      FinishedChain& chain = chains[static_cast<size_t>(at)];
+      chain = {estimate,
+               Eigen::MatrixXd(made.draws.rows(), made.draws.cols()),
+               Eigen::VectorXd(made.draws.rows()),
+               made.divergences,
+               made.saturated,
+               made.step,
+               made.acceptance,
+               made.evaluations,
+               made.message};
+      for (Eigen::Index i = 0; i < chain.costs.size(); ++i) {
         const Eigen::VectorXd x = made.draws.row(i);
-        cost[i] = density.CostFrom(x, made.log_density[i]);
-        p.row(i) = density.ParametersAt(x);
+        chain.costs[i] = density.CostFrom(x, made.log_density[i]);
+        chain.parameters.row(i) = density.ParametersAt(x);
       }
     });
+    return chains;
   }
 
  private:
@@ -334,18 +346,54 @@ class ChainRunner {
   long done_ = 0;
 };
 
+/// False with one line where there is no density to be sampled.
+bool SetUpChains(const PosteriorOptions& options, const FitOptions& fit, const FitResult& result,
+                 const std::vector<FreeCoordinate>& coordinates,
+                 const std::shared_ptr<LeastSquaresProblem>& problem, ChainSetup* setup,
+                 std::string* error) {
+  if (result.estimate.size() == 0 || result.estimate.size() > kMostParameters) {
+    *error = "expected 1 to " + std::to_string(kMostParameters) +
+             " parameters with an estimate, got " + std::to_string(result.estimate.size());
+    return false;
+  }
+  const std::string improper = FindImproper(result, coordinates, problem->entries());
+  if (!improper.empty()) {
+    *error = "the observations do not determine '" + improper +
+             "': expected a prior of it, or lower and upper";
+    return false;
+  }
+  PosteriorDensity density(problem, fit, coordinates, options.threads);
+  double cost = 0.0;
+  Eigen::VectorXd gradient;
+  Eigen::MatrixXd information;
+  if (!density.Evaluate(result.estimate, &cost, &gradient, &information)) {
+    *error = "the run at the estimate fails: " + density.message();
+    return false;
+  }
+  setup->middle = InsideOf(coordinates, result.estimate, gradient, information);
+  const std::vector<FreeCoordinate::Value> values = density.ValuesAt(setup->middle);
+  if (!density.Evaluate(density.ParametersAt(setup->middle), &cost, &gradient, &information)) {
+    *error = "the run beside the estimate fails: " + density.message();
+    return false;
+  }
+  setup->highest = -cost;
+  for (const FreeCoordinate::Value& value : values) setup->highest += value.log_factor;
+  setup->factor = FactorOf(values, gradient, information);
+  return true;
+}
+
 /// N of all draws, at equal distances.
-void KeepDraws(const std::vector<Eigen::MatrixXd>& parameters,
-               const std::vector<Eigen::VectorXd>& costs, Posterior* posterior) {
+void KeepDraws(const std::vector<FinishedChain>& chains, Posterior* posterior) {
   const int wanted = posterior->options.draws;
-  const int of_chain = static_cast<int>(parameters.front().rows());
-  posterior->draws.resize(wanted, parameters.front().cols());
+  const int of_chain = static_cast<int>(chains.front().costs.size());
+  posterior->draws.resize(wanted, chains.front().parameters.cols());
   posterior->costs.resize(wanted);
   for (int i = 0; i < wanted; ++i) {
     const auto at = static_cast<int>((i + 0.5) * posterior->transitions / wanted);
     const int chain = at / of_chain;
-    posterior->draws.row(i) = parameters[static_cast<size_t>(chain)].row(at % of_chain);
-    posterior->costs[i] = costs[static_cast<size_t>(chain)][at % of_chain];
+    const FinishedChain& of = chains[static_cast<size_t>(chain)];
+    posterior->draws.row(i) = of.parameters.row(at % of_chain);
+    posterior->costs[i] = of.costs[at % of_chain];
     posterior->chain_of.push_back(chain);
   }
 }
@@ -429,47 +477,42 @@ long TransitionsOf(const PosteriorOptions& options) {
   return static_cast<long>(options.chains) * (options.warm_up + DrawsOfChain(options));
 }
 
+bool MakeChains(const PosteriorOptions& options, const FitOptions& fit, const FitResult& result,
+                const std::vector<FreeCoordinate>& coordinates, const ProblemMaker& maker,
+                const std::vector<int>& numbers, std::vector<FinishedChain>* chains,
+                std::string* error) {
+  ChainSetup setup;
+  if (!SetUpChains(options, fit, result, coordinates, maker(), &setup, error)) return false;
+  *chains =
+      ChainRunner(options, fit, coordinates, maker, nullptr).Run(setup, result.estimate, numbers);
+  return true;
+}
+
 bool SamplePosterior(const PosteriorOptions& options, const FitOptions& fit,
                      const FitResult& result, const std::vector<FreeCoordinate>& coordinates,
                      const ProblemMaker& maker, const std::function<void(long)>& show,
-                     Posterior* posterior, std::string* error) {
+                     const std::map<int, FinishedChain>& done, Posterior* posterior,
+                     std::string* error) {
   using Clock = std::chrono::steady_clock;
   const Clock::time_point began = Clock::now();
   const std::shared_ptr<LeastSquaresProblem> problem = maker();
-  const std::vector<ParameterEntry>& entries = problem->entries();
-  if (result.estimate.size() == 0 || result.estimate.size() > kMostParameters) {
-    *error = "expected 1 to " + std::to_string(kMostParameters) +
-             " parameters with an estimate, got " + std::to_string(result.estimate.size());
-    return false;
+  ChainSetup setup;
+  if (!SetUpChains(options, fit, result, coordinates, problem, &setup, error)) return false;
+  std::vector<FinishedChain> chains(static_cast<size_t>(options.chains));
+  std::vector<int> to_make;
+  for (int number = 0; number < options.chains; ++number) {
+    const auto one = done.find(number);
+    if (one != done.end() && one->second.estimate == result.estimate) {
+      chains[static_cast<size_t>(number)] = one->second;
+    } else {
+      to_make.push_back(number);
+    }
   }
-  const std::string improper = FindImproper(result, coordinates, entries);
-  if (!improper.empty()) {
-    *error = "the observations do not determine '" + improper +
-             "': expected a prior of it, or lower and upper";
-    return false;
+  std::vector<FinishedChain> made =
+      ChainRunner(options, fit, coordinates, maker, show).Run(setup, result.estimate, to_make);
+  for (size_t i = 0; i < made.size(); ++i) {
+    chains[static_cast<size_t>(to_make[i])] = std::move(made[i]);
   }
-  PosteriorDensity density(problem, fit, coordinates, options.threads);
-  double cost = 0.0;
-  Eigen::VectorXd gradient;
-  Eigen::MatrixXd information;
-  if (!density.Evaluate(result.estimate, &cost, &gradient, &information)) {
-    *error = "the run at the estimate fails: " + density.message();
-    return false;
-  }
-  const Eigen::VectorXd middle = InsideOf(coordinates, result.estimate, gradient, information);
-  const std::vector<FreeCoordinate::Value> values = density.ValuesAt(middle);
-  if (!density.Evaluate(density.ParametersAt(middle), &cost, &gradient, &information)) {
-    *error = "the run beside the estimate fails: " + density.message();
-    return false;
-  }
-  double highest = -cost;
-  for (const FreeCoordinate::Value& value : values) highest += value.log_factor;
-  const Eigen::MatrixXd factor = FactorOf(values, gradient, information);
-  std::vector<NutsChain> chains;
-  std::vector<Eigen::VectorXd> costs;
-  std::vector<Eigen::MatrixXd> parameters;
-  ChainRunner(options, fit, coordinates, maker, show)
-      .Run(middle, highest, factor, &chains, &costs, &parameters);
   *posterior = Posterior();
   posterior->options = options;
   double least_cost = HUGE_VAL;
@@ -478,23 +521,23 @@ bool SamplePosterior(const PosteriorOptions& options, const FitOptions& fit,
       *error = "chain " + std::to_string(j) + ": " + chains[j].message;
       return false;
     }
-    posterior->transitions += static_cast<int>(chains[j].draws.rows());
+    posterior->transitions += static_cast<int>(chains[j].costs.size());
     posterior->divergences += chains[j].divergences;
     posterior->saturated += chains[j].saturated;
     posterior->steps.push_back(chains[j].step);
     posterior->acceptance += chains[j].acceptance / options.chains;
     posterior->evaluations += chains[j].evaluations;
-    least_cost = std::min(least_cost, costs[j].minCoeff());
+    least_cost = std::min(least_cost, chains[j].costs.minCoeff());
   }
   for (Eigen::Index k = 0; k < result.estimate.size(); ++k) {
-    Eigen::MatrixXd draws(parameters.front().rows(), static_cast<Eigen::Index>(chains.size()));
+    Eigen::MatrixXd draws(chains.front().costs.size(), static_cast<Eigen::Index>(chains.size()));
     for (size_t j = 0; j < chains.size(); ++j) {
-      draws.col(static_cast<Eigen::Index>(j)) = parameters[j].col(k);
+      draws.col(static_cast<Eigen::Index>(j)) = chains[j].parameters.col(k);
     }
     posterior->parameters.push_back(DescribeChains(draws));
   }
-  KeepDraws(parameters, costs, posterior);
-  AddWarnings(entries, result, least_cost, posterior);
+  KeepDraws(chains, posterior);
+  AddWarnings(problem->entries(), result, least_cost, posterior);
   posterior->seconds = std::chrono::duration<double>(Clock::now() - began).count();
   return true;
 }

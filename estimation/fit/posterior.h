@@ -26,11 +26,13 @@
 
 #include <Eigen/Core>
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "tangible/estimation/fit/fit.h"
+#include "tangible/estimation/fit/fit_parts.h"
 #include "tangible/estimation/uncertainty/chain_statistics.h"
 
 namespace tangible {
@@ -88,12 +90,20 @@ std::vector<FreeCoordinate> FreeCoordinates(const std::vector<ParameterEntry>& e
                                             const std::vector<RandomEffect>& effects);
 
 /// Samples around the estimate of `result`, which `fit` led to. `show`, which may be empty, gets
-/// the number of transitions that are done, from one thread at a time. False with one line where
-/// there is no density to be sampled.
+/// the number of transitions that are done, from one thread at a time. `done` has chains to take
+/// over that others have made around the same estimate, or none. False with one line where there is
+/// no density to be sampled.
 bool SamplePosterior(const PosteriorOptions& options, const FitOptions& fit,
                      const FitResult& result, const std::vector<FreeCoordinate>& coordinates,
                      const ProblemMaker& maker, const std::function<void(long)>& show,
-                     Posterior* posterior, std::string* error);
+                     const std::map<int, FinishedChain>& done, Posterior* posterior,
+                     std::string* error);
+
+/// Some of the chains, by their numbers; likewise.
+bool MakeChains(const PosteriorOptions& options, const FitOptions& fit, const FitResult& result,
+                const std::vector<FreeCoordinate>& coordinates, const ProblemMaker& maker,
+                const std::vector<int>& numbers, std::vector<FinishedChain>* chains,
+                std::string* error);
 
 /// The number of transitions of all chains, the warm-up's included.
 long TransitionsOf(const PosteriorOptions& options);

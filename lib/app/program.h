@@ -46,6 +46,9 @@ struct ProgramInfo {
   std::vector<std::string> inputs{};
   /// Flags that change no bit of the results.
   std::vector<std::string> without_effect = {"threads"};
+  /// Whether ranks of MPI that have no rows to divide run the program together, each with the same
+  /// flags and files: it then divides its work by math/shared_work.h, and decides nothing by time.
+  bool runs_in_step = false;
   /// The JSON Schema of the program's input, which --schema prints; none if empty.
   std::function<std::string()> schema{};
 };

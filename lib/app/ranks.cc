@@ -8,6 +8,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <condition_variable>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
@@ -23,6 +24,7 @@
 
 #include "tangible/app/program.h"
 #include "tangible/app/ranks_messages.h"
+#include "tangible/math/shared_work.h"
 #include "tangible/scene/text_file.h"
 
 namespace tangible {
@@ -35,11 +37,21 @@ constexpr std::chrono::microseconds kNap(200);
 // How the names of shards' files begin, which exist in memory only.
 constexpr std::string_view kShardName = "rank-shard:";
 
-enum Tag : int { kNextShard, kShardText, kReadFile, kReply, kEnd };
+enum Tag : int {
+  kNextShard,
+  kShardText,
+  kReadFile,
+  kReply,
+  kRunTogether,  // rank 0 has found that there are no rows, but work to divide
+  kExchange,     // what a rank has done of it, or of all ranks
+  kFinished,     // another rank has run the program to its end
+  kEnd
+};
 
 // What the program is run as at present.
 struct RankPart {
-  enum class Kind { kWhole, kShard, kMerge } kind = Kind::kWhole;
+  enum class Kind { kWhole, kShard, kMerge, kTogether } kind = Kind::kWhole;
+  bool writes = true;  ///< rank 0 alone does, of a run together
   long shard = 0;
   long of = 1;
   std::optional<std::string> text;  ///< of the shard's file, once it is written
@@ -48,6 +60,12 @@ struct RankPart {
 RankPart& Part() {
   static RankPart part;
   return part;
+}
+
+// Whether the program, as it was last called, can be run together.
+bool& RunsInStep() {
+  static bool runs = false;
+  return runs;
 }
 
 std::string NameOfShard(long shard) { return std::string(kShardName) + std::to_string(shard); }
@@ -114,7 +132,27 @@ void SayThatARankDied(int) {
   std::_Exit(kExitFailed);
 }
 
-class Ranks {
+// Rank 0 has ended the run while this rank waited for the others.
+class EndOfRun : public std::exception {};
+
+// Each text behind its length.
+std::string Joined(const std::vector<std::string>& texts) {
+  std::string joined;
+  for (const std::string& text : texts) joined += std::to_string(text.size()) + ":" + text;
+  return joined;
+}
+std::vector<std::string> Divided(const std::string& joined) {
+  std::vector<std::string> texts;
+  for (std::size_t at = 0; at < joined.size();) {
+    const std::size_t colon = joined.find(':', at);
+    const std::size_t size = std::stoul(joined.substr(at, colon - at));
+    texts.push_back(joined.substr(colon + 1, size));
+    at = colon + 1 + size;
+  }
+  return texts;
+}
+
+class Ranks : public SharedWork {
  public:
   Ranks(const RankMessages& messages, int (*body)(int, char**), int argc, char** argv)
       : messages_(messages), body_(body), argc_(argc), argv_(argv) {
@@ -140,6 +178,7 @@ class Ranks {
       worker.join();
     }
     Part() = RankPart();
+    if (failed_ && RunsInStep()) return LeadTogether();
     if (!failed_) {
       Part().kind = RankPart::Kind::kMerge;
       Part().of = shards_;
@@ -148,7 +187,7 @@ class Ranks {
       });
     }
     const int exit_status = Body();
-    for (int rank = 1; rank < messages_.size; ++rank) messages_.send(rank, kEnd, nullptr, 0);
+    SendToOthers(kEnd, "");
     return exit_status;
   }
 
@@ -161,17 +200,101 @@ class Ranks {
     RunShards(
         [this] {
           messages_.send(0, kNextShard, nullptr, 0);
-          return std::stol(Await(kReply));
+          const std::optional<std::string> shard = Await(kReply);
+          return shard ? std::stol(*shard) : -1L;
         },
         [this](long shard, const std::optional<std::string>& text) {
           const std::string message = std::to_string(shard) + (text ? "+" + *text : "-");
           messages_.send(0, kShardText, message.data(), message.size());
         });
+    if (!Await(kRunTogether)) return kExitDone;
+    Part() = RankPart();
+    Part().kind = RankPart::Kind::kTogether;
+    Part().writes = false;
+    try {
+      RunTogether();
+    } catch (const std::exception&) {
+      // Rank 0 has ended the run, or meets the same, and says what it is.
+    }
+    if (!ended_) messages_.send(0, kFinished, nullptr, 0);
     Await(kEnd);
     return kExitDone;
   }
 
+  int rank() const override { return messages_.rank; }
+  int size() const override { return messages_.size; }
+
+  std::vector<std::string> Exchange(const std::string& own) override {
+    if (messages_.rank == 0) return ExchangeOfLeader(own);
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (!ended_) messages_.send(0, kExchange, own.data(), own.size());
+    const std::optional<std::string> all = Await(kExchange);
+    if (!all) throw EndOfRun();
+    return Divided(*all);
+  }
+
  private:
+  int RunTogether() {
+    const SharedWork::Scope scope(this);
+    return Body();
+  }
+
+  void SendToOthers(int tag, const std::string& text) {
+    for (int rank = 1; rank < messages_.size; ++rank) {
+      messages_.send(rank, tag, text.data(), text.size());
+    }
+  }
+
+  // Rank 0 runs the program in a thread of its own, while it answers the others.
+  int LeadTogether() {
+    Part().kind = RankPart::Kind::kTogether;
+    SendToOthers(kRunTogether, "");
+    sent_.assign(static_cast<std::size_t>(messages_.size), std::nullopt);
+    int exit_status = kExitFailed;
+    std::exception_ptr failure;
+    std::atomic<bool> done{false};
+    std::thread worker([&] {
+      try {
+        exit_status = RunTogether();
+      } catch (...) {
+        failure = std::current_exception();
+      }
+      done = true;
+    });
+    int unused = 0;
+    while (!done) {
+      const bool answered = Answer(&unused);
+      if (!Distribute() && !answered) std::this_thread::sleep_for(kNap);
+    }
+    worker.join();
+    SendToOthers(kEnd, "");
+    if (failure) std::rethrow_exception(failure);
+    return exit_status;
+  }
+
+  std::vector<std::string> ExchangeOfLeader(const std::string& own) {
+    std::unique_lock<std::mutex> lock(mutex_);
+    sent_[0] = own;
+    distributed_.wait(lock, [this] { return !all_.empty(); });
+    return std::exchange(all_, {});
+  }
+
+  // Sends all of them what each has sent, once the last one has.
+  bool Distribute() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (finished_ && sent_[0]) SayThatARankDied(0);
+    for (const std::optional<std::string>& one : sent_) {
+      if (!one) return false;
+    }
+    for (std::optional<std::string>& one : sent_) {
+      all_.push_back(std::move(*one));
+      one.reset();
+    }
+    SendToOthers(kExchange, Joined(all_));
+    distributed_.notify_one();
+    return true;
+  }
+
   // Flags begin at their defaults each time.
   int Body() {
     const gflags::FlagSaver saver;
@@ -221,6 +344,14 @@ class Ranks {
     } else if (tag == kReadFile) {
       std::string error, content;
       reply = ReadTextFile(text, &content, &error) ? "+" + content : "-" + error;
+    } else if (tag == kExchange) {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      sent_[static_cast<std::size_t>(from)] = std::move(text);
+      return true;
+    } else if (tag == kFinished) {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      finished_ = true;
+      return true;
     } else {
       const std::size_t mark = text.find_first_of("+-");
       std::optional<std::string> file;
@@ -232,13 +363,18 @@ class Ranks {
     return true;
   }
 
-  std::string Await(int expected) {
+  // The text of the next message; none where it has another tag, as rank 0 has ended the run, which
+  // it says once.
+  std::optional<std::string> Await(int expected) {
+    if (ended_) return std::nullopt;
     int from = 0, tag = 0;
     std::size_t size = 0;
     while (!messages_.has_arrived(&from, &tag, &size)) std::this_thread::sleep_for(kNap);
     std::string text(size, '\0');
     messages_.receive(from, tag, text.data(), size);
-    return tag == expected ? text : "-1";
+    ended_ = tag == kEnd;
+    if (tag != expected) return std::nullopt;
+    return text;
   }
 
   // The files of shards are in memory; others are on the disk.
@@ -251,8 +387,8 @@ class Ranks {
 
   std::optional<std::string> AskForFile(const std::string& file, std::string* content) {
     const std::lock_guard<std::mutex> lock(mutex_);
-    messages_.send(0, kReadFile, file.data(), file.size());
-    const std::string reply = Await(kReply);
+    if (!ended_) messages_.send(0, kReadFile, file.data(), file.size());
+    const std::string reply = Await(kReply).value_or("-the run has ended");
     *content = reply.substr(1);
     return reply[0] == '+' ? "" : *content;
   }
@@ -265,7 +401,13 @@ class Ranks {
   std::mutex mutex_;
   long next_ = 0;
   bool failed_ = false;
+  bool ended_ = false;                        ///< rank 0 has said so
   std::map<std::string, std::string> texts_;  ///< of shards, by the names of their files
+  // Of a run together, on rank 0.
+  std::vector<std::optional<std::string>> sent_;  ///< by rank
+  std::vector<std::string> all_;                  ///< not yet taken by this rank's program
+  std::condition_variable distributed_;
+  bool finished_ = false;  ///< some other rank has come to its end
 };
 
 }  // namespace
@@ -299,8 +441,14 @@ bool SetRankPart(const ProgramInfo& info) {
   const auto is_default = [&](const char* name) {
     return gflags::GetCommandLineFlagInfo(name, &flag) && flag.current_value == flag.default_value;
   };
+  const bool divides_itself = !is_default("shard") || !is_default("merge");
+  RunsInStep() = info.runs_in_step && !divides_itself;
+  if (part.kind == RankPart::Kind::kTogether) {
+    if (is_default("threads")) gflags::SetCommandLineOption("threads", "1");
+    return true;
+  }
   // The whole run is made by rank 0 where nothing can be divided, or the user divides it.
-  if (!is_default("shard") || !is_default("merge")) return false;
+  if (divides_itself) return false;
   if (is_default("threads")) gflags::SetCommandLineOption("threads", "1");
   if (part.kind == RankPart::Kind::kMerge) {
     std::string files;
@@ -318,6 +466,7 @@ bool SetRankPart(const ProgramInfo& info) {
 }
 
 bool TakeRankOutput(const std::string& path, std::string_view text) {
+  if (!Part().writes) return true;
   if (path.rfind(kShardName, 0) != 0 || Part().kind != RankPart::Kind::kShard) return false;
   Part().text = text;
   return true;

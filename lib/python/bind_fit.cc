@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -15,11 +16,13 @@
 #include "tangible/app/row_archive.h"
 #include "tangible/estimation/fit/fit_checkpoint.h"
 #include "tangible/estimation/fit/fit_parts.h"
+#include "tangible/estimation/fit/posterior.h"
 #include "tangible/estimation/results/design_output.h"
 #include "tangible/estimation/results/fit_json.h"
 #include "tangible/estimation/results/fitted_scene.h"
 #include "tangible/estimation/results/missing_output.h"
 #include "tangible/estimation/results/noise_output.h"
+#include "tangible/estimation/results/posterior_output.h"
 #include "tangible/estimation/results/prediction.h"
 #include "tangible/estimation/results/report.h"
 #include "tangible/python/binding.h"
@@ -90,6 +93,7 @@ class FitProblemOf {
     std::string design, design_name;    // a file of candidates as text, or empty
     Parts parts;
     bool missing = false;  // whether it is asked what would explain the residuals
+    std::optional<PosteriorOptions> sampling;  // of draws from the posterior
   };
 
   int num_starts() const { return NumStarts(fit_.input.options()); }
@@ -121,11 +125,12 @@ class FitProblemOf {
     });
   }
 
-  // The result as tangible-fit writes it, the report as a page, the predictions as a table, and the
-  // fitted scene of each recording; all but the first are empty where there is no estimate.
+  // The result as tangible-fit writes it, the report as a page, the predictions as a table, the
+  // fitted scene of each recording and draws from the posterior as a table; all but the first are
+  // empty where there is no estimate, the last where none are wanted.
   py::tuple Run(const Wanted& wanted) {
     Found found = WithoutLock([&] { return turns_.Take([&] { return Do(wanted); }); });
-    return py::make_tuple(found.json, found.report, found.predictions, found.scenes);
+    return py::make_tuple(found.json, found.report, found.predictions, found.scenes, found.draws);
   }
 
  private:
@@ -134,6 +139,7 @@ class FitProblemOf {
   struct Found {
     std::string json, report, predictions;
     std::vector<Scene> scenes;
+    std::string draws;
   };
 
   Found Do(const Wanted& wanted) {
@@ -142,6 +148,7 @@ class FitProblemOf {
     const std::string refused =
         RefusedWithNoise(*problem_, {{"design", !wanted.design.empty()},
                                      {"profile", !wanted.profiles.empty()},
+                                     {"posterior", wanted.sampling.has_value()},
                                      {"missing", wanted.missing},
                                      {"checkpoint", !wanted.checkpoint.empty()},
                                      {"discretisation_check", wanted.discretisation_check}});
@@ -158,11 +165,13 @@ class FitProblemOf {
       next_log = [&] { return checkpoint->Next(); };
     }
     VarianceComponents components;
-    const FitResult result = FitWithComponents(fit_.input.options(), problem_.get(),
-                                               ProgressOf(wanted), &components, next_log);
+    FitResult result = FitWithComponents(fit_.input.options(), problem_.get(), ProgressOf(wanted),
+                                         &components, next_log);
     Scale(components.noise, &held_back);
     CheckSameFit(checkpoint.get());
     FitFindings findings{&components};
+    const std::optional<Posterior> posterior = Sample(wanted, &result);
+    if (posterior) findings.posterior = &*posterior;
     std::optional<DiscretisationCheck> check;
     if (wanted.discretisation_check && result.status == FitStatus::kConverged) {
       std::vector<double> spreads;
@@ -196,13 +205,28 @@ class FitProblemOf {
     OrderedJson all = ResultToJson(*problem_, result, findings);
     all["certificate"] = any && !result.certificate.verdict.empty() ? ToJson(result.certificate)
                                                                     : OrderedJson(nullptr);
-    Found found{all.dump(), "", "", {}};
+    Found found{all.dump(), "", "", {}, ""};
     if (!any) return found;
+    if (posterior) found.draws = PosteriorCsv(problem_->entries(), *posterior);
     found.report = FitReport(fit_.path, *problem_, result, findings);
     found.predictions =
         PredictionCsv(*problem_, result.residuals, findings.later, findings.held_out);
     for (int b = 0; b < problem_->num_blocks(); ++b) found.scenes.push_back(SceneOf(b, result));
     return found;
+  }
+
+  // Draws around the estimate, whose intervals become those of the result.
+  std::optional<Posterior> Sample(const Wanted& wanted, FitResult* result) {
+    if (!wanted.sampling || result->estimate.size() == 0) return std::nullopt;
+    std::optional<Posterior> made(std::in_place);
+    std::string error;
+    if (!SamplePosterior(*wanted.sampling, fit_.input.options(), *result,
+                         FreeCoordinates(problem_->entries(), problem_->effects()),
+                         MakerOf(fit_.input, *problem_), nullptr, {}, &*made, &error)) {
+      throw Error("posterior: " + error);
+    }
+    TakeIntervals(*made, result);
+    return made;
   }
 
   Scene SceneOf(int b, const FitResult& result) {
@@ -378,7 +402,13 @@ void BindFit(py::module_* module) {
               const std::string& checkpoint, const py::object& on_iteration,
               const std::vector<std::string>& profiles, const std::vector<std::string>& starts_done,
               const std::vector<std::string>& profiles_done, const std::string& design,
-              const std::string& design_name, bool missing) {
+              const std::string& design_name, bool missing,
+              const std::optional<std::tuple<int, int, int, double, unsigned>>& sampling) {
+             std::optional<PosteriorOptions> options;
+             if (sampling) {
+               const auto& [draws, chains, warm_up, target, seed] = *sampling;
+               options = {draws, chains, warm_up, target, seed};
+             }
              return fit.Run({max_iterations,
                              predict_from,
                              discretisation_check,
@@ -388,7 +418,8 @@ void BindFit(py::module_* module) {
                              design,
                              design_name,
                              {starts_done, profiles, profiles_done},
-                             missing});
+                             missing,
+                             options});
            });
 }
 

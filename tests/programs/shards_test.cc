@@ -374,10 +374,31 @@ TEST_F(ShardsOfFitsTest, AreTheFitInOne) {
   }
 }
 
+// With several starts and profiles too each shard finds the estimate for itself.
+TEST_F(ShardsOfFitsTest, OfChainsAreTheDrawsInOne) {
+  for (const char* keys : {R"(, "starts": 1)", R"(, "starts": 3, "seed": 2)"}) {
+    const Divided work =
+        Fit(keys, "--posterior=60 --posterior_chains=3 --posterior_warm_up=50 --posterior_seed=7");
+    Both both = Compare(work, 2, "--posterior_samples");
+    EXPECT_EQ(both.one.exit_status, 0) << both.one.error;
+    for (nlohmann::ordered_json* json : {&both.one_out, &both.merged_out}) {
+      ASSERT_EQ((*json)["posterior"]["draws"], 60);
+      (*json)["posterior"].erase("seconds");
+    }
+    EXPECT_EQ(WithoutSeconds(both.merged_out).dump(), WithoutSeconds(both.one_out).dump());
+    EXPECT_EQ(Read(Path("merged.html")), Read(Path("one.html"))) << "the draws";
+    EXPECT_NE(Read(Path("one.html")).find("\n59,2,"), std::string::npos);
+  }
+  RunShards(Fit("", "--posterior=60 --posterior_chains=3 --posterior_warm_up=50"), 2);
+  const auto part = nlohmann::json::parse(Read(Path("part0.json")));
+  ASSERT_EQ(part["chains"].size(), 2U);
+  EXPECT_EQ(part["chains"][1]["chain"], 2);
+}
+
 TEST_F(ShardsOfFitsTest, MistakesAreOneLine) {
   const Divided plain = Fit("");
   ExpectOneLine(RunTo(plain, "--shard=0/2", "x.json"), 1,
-                "--shard: expected a fit with \"starts\" above 1, or --profile");
+                "--shard: expected a fit with \"starts\" above 1, --profile or --posterior");
   const Divided work = Fit(R"(, "starts": 3)");
   RunShards(work, 2);
   EXPECT_EQ(nlohmann::json::parse(Read(Path("part0.json")))["starts"].size(), 2U);

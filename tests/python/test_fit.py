@@ -164,3 +164,44 @@ def test_what_is_missing_is_named() -> None:
     assert "What would explain the residuals" in result.report()
     without = tangible.fit(scene, data, ["gravity/y", "bodies/ball/velocity/y"], sigma=0.01)
     assert without.missing == [] and without.estimates == result.estimates
+
+
+def test_draws_from_the_posterior() -> None:
+    scene = tangible.Scene(simulation={"stepping": "event", "dt": 0.1, "duration": 1.0})
+    scene.add_body("ball", mass=2.0, inertia=1.0, position=[0, 0], velocity=[0, 3])
+    run = tangible.simulate(scene)
+    data = {"time": run.times, "y": run["ball/y"] + 0.01 * np.random.default_rng(4).normal(size=11)}
+    names = ["gravity/y", "bodies/ball/velocity/y"]
+    # A start elsewhere, so that the draws are not of the start.
+    options = {"sigma": 0.01, "initial": {"gravity/y": -9.0}, "posterior_seed": 5}
+    found = tangible.fit(scene, data, names, posterior=600, **options)
+    plain = tangible.fit(scene, data, names, sigma=0.01)
+    assert set(found.draws) == {"draw", "chain", "cost", *names}
+    # Predictions are linear in both, so that the posterior is the Gaussian of the covariance.
+    drawn = np.array([found.draws[name] for name in names])
+    assert drawn.shape == (2, 600) and set(found.draws["chain"]) == {0, 1, 2, 3}
+    deviations = np.sqrt(np.diag(plain.covariance))
+    assert np.all(np.abs(drawn.mean(1) - list(plain.estimates.values())) < 0.25 * deviations)
+    np.testing.assert_allclose(np.cov(drawn), plain.covariance, rtol=0.25)
+    for name, statistics, mean in zip(names, found.posterior["parameters"], drawn.mean(1)):
+        assert statistics["name"] == name and statistics["r_hat"] < 1.02
+        low, high = found.intervals[name] or (None, None)
+        assert low is not None and high is not None and low < mean < high
+    assert "posterior" in found.report()
+    # The same draws again, others with another seed; and domains are draws.
+    again = tangible.fit(scene, data, names, posterior=600, **options)
+    np.testing.assert_array_equal(again.draws["gravity/y"], found.draws["gravity/y"])
+    other = tangible.fit(scene, data, names, posterior=600, **{**options, "posterior_seed": 6})
+    assert np.any(other.draws["gravity/y"] != found.draws["gravity/y"])
+    domains = found.domains(700, seed=1)
+    assert domains["gravity/y"].shape == (700,)
+    assert set(domains["gravity/y"]) == set(found.draws["gravity/y"])
+    assert plain.draws == {} and plain.posterior == {}
+    for wrong, said in [
+        ({"posterior": 0}, "^posterior: expected a whole number from 1 to 1000000, got 0$"),
+        ({"posterior": True}, "^posterior: expected a whole number"),
+        ({"posterior": 10, "posterior_chains": 65}, "^posterior_chains: .* from 1 to 64, got 65$"),
+        ({"posterior": 10, "posterior_target": 1.0}, "^posterior_target: expected a number from 0.01"),
+    ]:
+        with pytest.raises(ValueError, match=said):
+            tangible.fit(scene, data, names, sigma=0.01, **wrong)

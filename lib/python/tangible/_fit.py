@@ -142,6 +142,8 @@ class FitResult:
             (s), `target`, `coordinate`, `used` ("fit" or "prediction"), `sigma`, `observed`,
             `predicted`, `residual` (predicted - observed), `residual_in_sigma`, and more.
             `pandas.DataFrame(result.predictions)` is a table.
+        draws: Draws from the posterior, if `posterior` asked for them: arrays of `draw`, `chain`,
+            `cost` and of each parameter by its name; else empty.
         data: The whole result as `tangible-fit --out` writes it.
     """
 
@@ -152,6 +154,7 @@ class FitResult:
         predictions: str = "",
         scenes: Iterable[_core.Scene] = (),
         parameters: Sequence[Any] = (),
+        draws: str = "",
     ) -> None:
         self.data = data
         self._page = page
@@ -164,6 +167,7 @@ class FitResult:
             p["name"]: p["estimate"] for p in data["parameters"] if p["estimate"] is not None
         }
         self.predictions = _read_predictions(predictions)
+        self.draws = _read_draws(draws)
         names = list(dict.fromkeys(self.predictions.get("recording", np.array([""])).tolist()))
         self.scenes = {name: Scene._of_core(core) for name, core in zip(names, scenes)}
 
@@ -189,17 +193,24 @@ class FitResult:
     def domains(self, count: int, seed: int = 0) -> dict[str, Floats]:
         """Scenes that the observations leave possible, for `Simulation(domains=...)`.
 
-        Draws from the Gaussian of estimates and covariance, each kept within its range: {path of the
-        scene: shape (count,)}. Parameters of single recordings are left out.
+        From the draws of the posterior, if `posterior` asked for them, each at most once more often
+        than another; else from the Gaussian of estimates and covariance, each kept within its range:
+        {path of the scene: shape (count,)}. Parameters of single recordings are left out.
         """
         names = self.names
-        mean = np.array([self.estimates[name] for name in names])
-        covariance = self.covariance
-        known = np.isfinite(np.diag(covariance))
-        drawn = np.tile(mean, (count, 1))
-        drawn[:, known] = np.random.default_rng(seed).multivariate_normal(
-            mean[known], covariance[np.ix_(known, known)], size=count, method="eigh"
-        )
+        random = np.random.default_rng(seed)
+        if self.draws:
+            table = np.column_stack([self.draws[name] for name in names])
+            rows = [random.permutation(len(table)) for _ in range(-(-count // len(table)))]
+            drawn = table[np.concatenate([np.zeros(0, dtype=np.intp), *rows])[:count]]
+        else:
+            mean = np.array([self.estimates[name] for name in names])
+            covariance = self.covariance
+            known = np.isfinite(np.diag(covariance))
+            drawn = np.tile(mean, (count, 1))
+            drawn[:, known] = random.multivariate_normal(
+                mean[known], covariance[np.ix_(known, known)], size=count, method="eigh"
+            )
         values: dict[str, Floats] = {}
         for entry in self._parameters:
             given = {"path": entry} if isinstance(entry, str) else entry
@@ -259,6 +270,13 @@ class FitResult:
         `candidates` its `widths`, `gain`, `takes`, ..., and which is `d_optimal`, `a_optimal`,
         `narrowest` of each parameter; empty unless candidates were given."""
         return dict(self.data.get("design") or {})
+
+    @property
+    def posterior(self) -> dict[str, Any]:
+        """What the draws of `posterior` say: of each of `parameters` its `mean`,
+        `standard_deviation`, `median`, `interval_95`, `r_hat`, `ess_bulk` and `ess_tail`, and
+        `transitions`, `divergences`, `saturated`, `acceptance`, ...; empty without them."""
+        return dict(self.data.get("posterior") or {})
 
     @property
     def missing(self) -> list[dict[str, Any]]:
@@ -388,6 +406,31 @@ def _read_predictions(text: str) -> dict[str, NDArray[Any]]:
     return columns
 
 
+def _read_draws(text: str) -> dict[str, Floats]:
+    """The columns of the programs' table of draws."""
+    if not text:
+        return {}
+    header, *rows = csv.reader(io.StringIO(text))
+    return {name: np.array([float(cell) for cell in cells]) for name, cells in zip(header, zip(*rows))}
+
+
+def _sampling(
+    draws: int | None, chains: int, warm_up: int, target: float, seed: int
+) -> tuple[int, int, int, float, int] | None:
+    """The options of draws from the posterior, as the core takes them."""
+    if draws is None:
+        return None
+    for name, value, low, high in (
+        ("posterior", draws, 1, 1_000_000), ("posterior_chains", chains, 1, 64),
+        ("posterior_warm_up", warm_up, 0, 1_000_000), ("posterior_seed", seed, 0, 2**31 - 1),
+    ):
+        if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not low <= value <= high:
+            raise ValueError(f"{name}: expected a whole number from {low} to {high}, got {value}")
+    if not 0.01 <= target <= 0.999:
+        raise ValueError(f"posterior_target: expected a number from 0.01 to 0.999, got {target}")
+    return int(draws), int(chains), int(warm_up), float(target), int(seed)
+
+
 def _start(problem: Problem, number: int, max_iterations: int, predict_from: float) -> str:
     """A start of a fit, in a worker's process."""
     with problem.read() as core:
@@ -446,6 +489,11 @@ def fit(
     profile: Sequence[str] = (),
     design: FitLike | None = None,
     missing: bool = False,
+    posterior: int | None = None,
+    posterior_chains: int = 4,
+    posterior_warm_up: int = 200,
+    posterior_target: float = 0.8,
+    posterior_seed: int = 0,
     discretisation_check: bool = False,
     checkpoint: str | os.PathLike[str] | None = None,
     callback: Callable[[dict[str, Any]], object] | None = None,
@@ -485,6 +533,12 @@ def fit(
             "wanted": {parameter: width}}; what each would narrow stands in `FitResult.design`.
         missing: Whether it is asked what would explain the residuals, with real fits of the best
             candidates: `FitResult.missing`.
+        posterior: So many draws from the posterior density of the parameters, by Hamiltonian Monte
+            Carlo (`tangible-fit --posterior`): `FitResult.draws` and `posterior`; the intervals are
+            theirs, and `domains` takes them.
+        posterior_chains, posterior_warm_up, posterior_target, posterior_seed: Of the draws: chains,
+            each from a start of its own; transitions of each before its draws; mean acceptance, nearer
+            to 1 with shorter steps; the seed.
         discretisation_check: Whether it is fitted with half the step too, which shows its bias.
         checkpoint: A file that keeps the fit's evaluations: where the fit is interrupted, the same
             call goes on from it, with the same bits.
@@ -521,6 +575,9 @@ def fit(
         if callback is not None:
             callback(said)
 
+    sampling = _sampling(
+        posterior, posterior_chains, posterior_warm_up, posterior_target, posterior_seed
+    )
     made = _problem(problem, data, parameters, sigma, points, recordings, folder, initial, keys)
     end = math.inf if predict_from is None else float(predict_from)
     profiles = names(profile, "profile")
@@ -532,7 +589,7 @@ def fit(
     try:
         starts_done, profiles_done = _parts(executor, made, max_iterations, end, profiles)
         with made.read() as core:
-            text, page, predictions, scenes = core.run(
+            text, page, predictions, scenes, draws = core.run(
                 max_iterations,
                 end,
                 discretisation_check,
@@ -543,12 +600,13 @@ def fit(
                 profiles_done,
                 *candidates,
                 missing,
+                sampling,
             )
     finally:
         if progress:
             print(file=sys.stderr)
     listed = json.loads(made.text).get("parameters", [])
-    result = FitResult(json.loads(text), page, predictions, scenes, listed)
+    result = FitResult(json.loads(text), page, predictions, scenes, listed, draws)
     if result.status != "converged" and on_failure == "raise":
         raise _core.TangibleError(f"{result.status}: {result.message}")
     warn(result.warnings)

@@ -76,7 +76,7 @@ std::vector<int> RanksOf(const FitProblem& problem, const Eigen::VectorXd& truth
   std::string error;
   EXPECT_TRUE(SamplePosterior(sampling, options, fit,
                               FreeCoordinates(recordings->entries(), recordings->effects()),
-                              MakerOf(input, *recordings), {}, &posterior, &error))
+                              MakerOf(input, *recordings), {}, {}, &posterior, &error))
       << error;
   std::vector<int> ranks(static_cast<size_t>(truth.size()), 0);
   for (Eigen::Index i = kThinning - 1; i < posterior.draws.rows(); i += kThinning) {

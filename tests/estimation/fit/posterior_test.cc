@@ -69,7 +69,7 @@ Drawn Draw(const ProblemMaker& maker, const PosteriorOptions& options = {}, doub
   fit.profile_pass = ProfilePass::kSkip;
   const std::shared_ptr<LeastSquaresProblem> problem = maker();
   drawn.fit = Fit(fit, problem.get(), {});
-  SamplePosterior(options, fit, drawn.fit, FreeCoordinates(problem->entries(), {}), maker, {},
+  SamplePosterior(options, fit, drawn.fit, FreeCoordinates(problem->entries(), {}), maker, {}, {},
                   &drawn.posterior, &drawn.error);
   return drawn;
 }
@@ -260,7 +260,7 @@ TEST(PosteriorTest, WhatIsNotDeterminedIsRefused) {
   std::string error;
   EXPECT_FALSE(SamplePosterior(
       {}, {}, fit, FreeCoordinates(problem.entries(), {}),
-      [&] { return std::make_shared<MeanProblem>(entry, std::vector<double>{1.0}); }, {},
+      [&] { return std::make_shared<MeanProblem>(entry, std::vector<double>{1.0}); }, {}, {},
       &posterior, &error));
   EXPECT_EQ(error,
             "the observations do not determine 'p': expected a prior of it, or lower and upper");
