@@ -26,6 +26,18 @@ namespace {
 // With more unknowns than this the rank is determined anew only where modes change.
 constexpr size_t kRankEachStep = 150;
 
+// How fast the contacts [first, last) approach before an impact, at most, m/s or rad/s.
+double ApproachOf(const StepRecord& impact, size_t first, size_t last) {
+  double approach = 0.0;
+  for (size_t i = first; i < last; ++i) {
+    const ActiveContact& contact = impact.contacts[i];
+    const ContactBlock<double>& block = impact.problem.contacts[i];
+    approach = std::max(approach, -RelativeSpeed(impact.before, contact.a, block.normal_a,
+                                                 contact.b, block.normal_b));
+  }
+  return approach;
+}
+
 }  // namespace
 
 std::string ContactName(const ModelStructure& structure, const ActiveContact& contact) {
@@ -219,16 +231,19 @@ void RolloutCertifier::AddLinearSystem(const StepRecord& record, ContactSystem* 
   certificate_.linear_residual = std::max(certificate_.linear_residual, quality.residual);
 }
 
-// Each pair of shapes is examined once; its contacts are adjacent in the list.
+// Each pair of shapes is examined once; its contacts are adjacent in the list. In an impact these
+// are pairs that approach: what else it moves has not just met.
 void RolloutCertifier::AddFeatures(const Model<double>& model, const StepRecord& record, long step,
                                    ContactSystem* system) {
   const std::vector<ActiveContact>& contacts = record.contacts;
+  const double approach = record.h == 0.0 ? ApproachOf(record, 0, contacts.size()) : 0.0;
   size_t last = 0;
   for (size_t first = 0; first < contacts.size(); first = last) {
     for (last = first + 1;
          last < contacts.size() && contacts[last].IsOfTheSameShapes(contacts[first]);) {
       ++last;
     }
+    if (record.h == 0.0 && !(ApproachOf(record, first, last) > kLoaded * approach)) continue;
     const Place place{model.structure.get(),       step, record.time, first, &contacts[first],
                       record.solution.modes[first]};
     AddMargin(FeatureChangeMargin(model, record, first, last, system), place,

@@ -124,6 +124,7 @@ void RolloutCertifier::AddImpact(const Model<double>& model, long step, Impulses
   if (is_first) {
     AddSimultaneous(model, step, *impact);
     AddUnloaded(model, step, *impact);
+    AddFeatures(model, *impact, step, &impact->system);
   }
   AddQuality(impact->problem, impact->solution.modes, &impact->system);
 }

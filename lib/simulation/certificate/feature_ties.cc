@@ -292,8 +292,10 @@ class PairTies {
         momentum += p.load[k] * p.load[k] / p.mass[k];
       }
     }
-    return std::sqrt(jump) > kDifference * (kJump * std::sqrt(momentum) +
-                                            kJumpOfRate * std::sqrt(mass) * size_ / record_.h);
+    // An impact has no time, and what it changes is its speeds.
+    const double of_rate =
+        record_.h > 0.0 ? kJumpOfRate * std::sqrt(mass) * size_ / record_.h : 0.0;
+    return std::sqrt(jump) > kDifference * (kJump * std::sqrt(momentum) + of_rate);
   }
 
   // The smallest move that changes the choice, to a thousandth of `length`.

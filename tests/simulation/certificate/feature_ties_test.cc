@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "../../support/gradients.h"
 #include "../../support/scenes.h"
 #include "tangible/simulation/certificate/certify.h"
 #include "tangible/simulation/certificate/tolerances.h"
@@ -84,6 +85,37 @@ TEST(FeatureTies, ABallExactlyAboveACornerIsAtAKink) {
     EXPECT_NE(c.verdict.find("contact of top and support, where another corner or edge takes over"),
               std::string::npos)
         << c.verdict;
+  }
+}
+
+// By events a ball strikes a box at the height of its corner: below it rebounds from the face,
+// above from the corner, whose normal turns with the ball's height y: vy = (1 + e) v y / R.
+TEST(FeatureTies, ABallThatStrikesLevelWithACornerIsAtAKink) {
+  for (const double dt : {0.05, 0.007}) {
+    for (const double y : {0.0, 1e-3, -1e-3}) {
+      Scene scene = test_scenes::SceneOf(R"({"gravity": [0, 0], "bodies": [
+          {"name": "ball", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "velocity": [2, 0],
+           "position": [-1, 0], "restitution": 0.5},
+          {"name": "box", "static": true, "shape": {"box": {"size": [1, 1]}},
+           "position": [0.5, -0.5], "restitution": 0.5}],
+          "simulation": {"stepping": "event", "dt": 0.05, "duration": 0.7}})");
+      scene.simulation.dt = dt;
+      scene.bodies[0].position.y() = y;
+      const GradientResult found =
+          testing::Jacobian(scene, {"bodies/ball/position/y"}, GradientMethod::kTangent);
+      ASSERT_TRUE(found.done) << found.message;
+      const std::string& verdict = found.certificate.verdict;
+      if (y == 0.0) {
+        EXPECT_EQ(verdict.find("near a kink: "), 0U) << verdict;
+        EXPECT_NE(verdict.find("contact of ball and box, where another corner or edge takes over"),
+                  std::string::npos)
+            << verdict;
+        continue;
+      }
+      EXPECT_EQ(verdict, "trustworthy") << y;
+      const double vy = found.jacobian(4, 0);
+      EXPECT_NEAR(vy, y > 0.0 ? 1.5 * 2.0 / 0.1 : 0.0, y > 0.0 ? 0.01 : 1e-12) << y;
+    }
   }
 }
 
