@@ -117,10 +117,11 @@ TEST_F(TangibleTradeoffTest, ScenesOfTheReadmeRun) {
   const std::string folder = TANGIBLE_SOURCE_DIR "/data/tradeoff_scenes/";
   const ProgramRun run =
       Run("tangible-tradeoff", "'" + folder + "stack.json' '" + folder + "billiards.json' '" +
-                                   folder + "pendulum.json' --dt_factors=0.5 " +
+                                   folder + "pendulum.json' '" + folder +
+                                   "falling_discs.json' --dt_factors=0.5 " +
                                    "--repeat_seconds=1e-6 " + Flag("picture", "p.svg"));
   ASSERT_EQ(run.exit_status, 0) << run.error;
-  for (const char* expected : {"\nstack\n", "\nbilliards\n", "\npendulum\n"}) {
+  for (const char* expected : {"\nstack\n", "\nbilliards\n", "\npendulum\n", "\nfalling discs\n"}) {
     EXPECT_NE(run.out.find(expected), std::string::npos) << run.out;
   }
   EXPECT_EQ(run.out.find("reference: fixed"), std::string::npos) << run.out;
