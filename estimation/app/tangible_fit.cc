@@ -62,6 +62,7 @@ DEFINE_string(derivatives, "",
               "tangent, adjoint, jet, jet_implicit or finite_difference, instead of the file's");
 DEFINE_string(initial, "", "other initial values: name=value, separated by commas");
 DEFINE_int32(max_iterations, 50, "of each start");
+DEFINE_int32(threads, 0, "that evaluate recordings; 0: one a core; results do not depend on it");
 DEFINE_string(profile, "",
               "names of parameters, separated by commas, whose intervals are found by profiles: "
               "the cost with the parameter held, the others minimised");
@@ -194,8 +195,12 @@ std::string ReadPosterior(std::optional<PosteriorOptions>* options) {
                                     {"--posterior_seed", FLAGS_posterior_seed, 0},
                                     {"--posterior_target", FLAGS_posterior_target, 0.01, 0.999}});
   if (!error.empty()) return error;
-  *options = {draws[0], FLAGS_posterior_chains, FLAGS_posterior_warm_up, FLAGS_posterior_target,
-              static_cast<unsigned>(FLAGS_posterior_seed)};
+  *options = {draws[0],
+              FLAGS_posterior_chains,
+              FLAGS_posterior_warm_up,
+              FLAGS_posterior_target,
+              static_cast<unsigned>(FLAGS_posterior_seed),
+              FLAGS_threads};
   const std::string folder =
       FLAGS_posterior_scenes.empty() ? "" : CheckSceneFolder(FLAGS_posterior_scenes);
   return folder.empty() ? "" : "--posterior_scenes: " + folder;
@@ -206,6 +211,7 @@ int ApplyFlags(Prepared* prepared) {
   for (RecordingInput& recording : prepared->fit.input.recordings) {
     FitProblem& problem = recording.problem;
     problem.options.max_iterations = FLAGS_max_iterations;
+    problem.options.threads = FLAGS_threads;
     std::string error = OverrideInitial(FLAGS_initial, &problem.parameters);
     if (!error.empty()) {
       return ReportError("tangible-fit: --initial: " + error, kExitUsage);
@@ -638,7 +644,7 @@ int Main(int argc, char** argv) {
            "                    [--predictions=P.csv] [--predict_from=T]\n"
            "                    [--discretisation_check] [--compare_motion] [--checkpoint=C.json]\n"
            "                    [--profile=P1,P2] [--missing] [--design=D.json]\n"
-           "                    [--posterior=N]\n"
+           "                    [--posterior=N] [--threads=T]\n"
            "                    [--posterior_samples=P.csv] [--posterior_scenes=FOLDER]\n"
            "                    [--posterior_bands=B.csv]\n"
            "                    [--shard=I/N | --merge=R0.json,R1.json,...]",
@@ -659,6 +665,8 @@ int Main(int argc, char** argv) {
                            std::to_string(FLAGS_max_iterations),
                        kExitUsage);
   }
+  const std::string outside = FirstOutside({{"--threads", FLAGS_threads, 0, kMostThreads}});
+  if (!outside.empty()) return ReportError("tangible-fit: " + outside, kExitUsage);
   ShardPlan plan;
   const std::string wrong = CheckShardFlags(&plan);
   if (!wrong.empty()) return ReportError("tangible-fit: " + wrong, kExitUsage);
