@@ -118,8 +118,7 @@ class Reader {
       problem_.options.gradient_tolerance =
           root_.At("gradient_tolerance").Number(NumberKind::kPositive);
     }
-    if (root_.Has("second_order"))
-      problem_.options.second_order = root_.At("second_order").Boolean();
+    if (root_.Has("second_order")) ReadSecondOrder(root_.At("second_order"));
     if (root_.Has("reference_extension")) {
       const JsonReader extension = root_.At("reference_extension");
       problem_.options.reference_extension = extension.Boolean();
@@ -250,6 +249,16 @@ class Reader {
       term.axis = axis;
       term.target = target[axis];
       problem_.terms.push_back(term);
+    }
+  }
+
+  // True, false or "secants".
+  void ReadSecondOrder(const JsonReader& json) {
+    if (json.IsString()) {
+      json.Choice({"secants"});
+      problem_.options.secants = true;
+    } else {
+      problem_.options.second_order = json.Boolean();
     }
   }
 

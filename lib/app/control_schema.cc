@@ -46,7 +46,7 @@ OrderedJson ControlSchema() {
            {"horizon", seconds},
            {"max_iterations", SchemaOfInteger(1, kMost)},
            {"gradient_tolerance", positive},
-           {"second_order", SchemaOfFlag()},
+           {"second_order", SchemaOfAny({SchemaOfFlag(), SchemaOfWords({"secants"})})},
            {"reference_extension", SchemaOfFlag()},
            {"surrogate",
             SchemaOfObject(

@@ -15,7 +15,25 @@ namespace {
 
 // Number of the fractions of a step that a line search tries: 1.1^(−j²).
 constexpr int kShares = 11;
+// With secants a line search begins so many fractions above the last one that was accepted: where
+// steps stay small the whole ones would be rolled out in vain, five or six in each iteration.
+constexpr int kLargerShares = 2;
 double ShareOf(int j) { return std::pow(1.1, -j * j); }
+
+// Q of a step without the shift.
+struct StepQuadratic {
+  VectorX<double> x, u;
+  MatrixX<double> xx, ux, uu;
+};
+
+// Changes a symmetric H by a matrix of rank one to one with H change = gradient_change.
+void LearnFromSecant(const VectorX<double>& change, const VectorX<double>& gradient_change,
+                     MatrixX<double>* h) {
+  const VectorX<double> missing = gradient_change - *h * change;
+  const double along = missing.dot(change);
+  if (std::abs(along) <= kSecantAngle * missing.norm() * change.norm()) return;
+  *h += missing * missing.transpose() / along;
+}
 
 // A plan's steps to first order, and its cost to second order.
 struct Linearisation {
@@ -28,6 +46,7 @@ class Solver {
   Solver(const ControlProblem& problem, const IlqrOptions& options)
       : p_(problem),
         options_(options),
+        secants_(options.secants && !options.second_order),
         n_(problem.map->num_states()),
         m_(problem.map->num_controls()) {}
 
@@ -151,9 +170,14 @@ class Solver {
       return false;
     }
     IlqrIteration iteration{result_.plan.cost, result_.gradient, 0.0, 0.0};
-    const bool convex = Backward();
-    iteration.shift = shift_;
+    bool convex = Backward();
     if (convex) iteration.step = Search();
+    if (iteration.step == 0.0 && secants_ && !curvature_.empty()) {
+      curvature_.clear();
+      convex = Backward();
+      if (convex) iteration.step = Search();
+    }
+    iteration.shift = shift_;
     if (options_.progress) {
       options_.progress(0, static_cast<long>(result_.iterations.size()), iteration);
     }
@@ -241,39 +265,48 @@ class Solver {
     const double largest = LargestCurvature();
     const VectorX<double> effects = LargestEffects();
     for (long k = steps - 1; k >= 0; --k) {
-      const MatrixX<double>& a = at_.a[k];
       const MatrixX<double>& b = at_.b[k];
-      const CostExpansion& cost = at_.cost[k];
-      const VectorX<double> q_x = cost.x + a.transpose() * v_x;
-      const VectorX<double> q_u = cost.u + b.transpose() * v_x;
-      MatrixX<double> q_xx = cost.xx + a.transpose() * v_xx * a;
-      MatrixX<double> q_ux = cost.ux + b.transpose() * v_xx * a;
-      MatrixX<double> q_uu = cost.uu + b.transpose() * v_xx * b;
-      if (options_.second_order) {
-        q_xx += curvature_[k].topLeftCorner(n_, n_);
-        q_ux += curvature_[k].bottomLeftCorner(m_, n_);
-        q_uu += curvature_[k].bottomRightCorner(m_, m_);
-      }
+      StepQuadratic q = QuadraticOf(k, v_x, v_xx);
       const double shift = shift_ * largest;
-      const MatrixX<double> shifted_uu = q_uu + shift * b.transpose() * b;
-      const MatrixX<double> shifted_ux = q_ux + shift * b.transpose() * a;
-      const BoxQuadraticSolution box = SolveStep(k, effects, shifted_uu, q_u);
+      BoxQuadraticSolution box = SolveStep(k, effects, q.uu + shift * b.transpose() * b, q.u);
+      if (secants_ && !curvature_.empty() && box.status != BoxQuadraticStatus::kSolved) {
+        curvature_[k].setZero();
+        q = QuadraticOf(k, v_x, v_xx);
+        box = SolveStep(k, effects, q.uu + shift * b.transpose() * b, q.u);
+      }
       if (box.status != BoxQuadraticStatus::kSolved || !box.x.allFinite()) return false;
       MatrixX<double> gain = MatrixX<double>::Zero(m_, n_);
       if (!box.free.empty()) {
+        const MatrixX<double> shifted_ux = q.ux + shift * b.transpose() * at_.a[k];
         gain(box.free, Eigen::all) =
             -box.factor.Solve(MatrixX<double>(shifted_ux(box.free, Eigen::all)));
       }
-      linear_ += box.x.dot(q_u);
-      quadratic_ += 0.5 * box.x.dot(q_uu * box.x);
-      v_x = q_x + gain.transpose() * (q_uu * box.x + q_u) + q_ux.transpose() * box.x;
+      linear_ += box.x.dot(q.u);
+      quadratic_ += 0.5 * box.x.dot(q.uu * box.x);
+      v_x = q.x + gain.transpose() * (q.uu * box.x + q.u) + q.ux.transpose() * box.x;
       v_xx =
-          q_xx + gain.transpose() * q_uu * gain + gain.transpose() * q_ux + q_ux.transpose() * gain;
+          q.xx + gain.transpose() * q.uu * gain + gain.transpose() * q.ux + q.ux.transpose() * gain;
       v_xx = 0.5 * (v_xx + v_xx.transpose()).eval();
       forward_[k] = box.x;
       new_gains_[k] = gain;
     }
     return std::isfinite(linear_) && std::isfinite(quadratic_);
+  }
+
+  // Q of step k, with V' of the step after it.
+  StepQuadratic QuadraticOf(long k, const VectorX<double>& v_x, const MatrixX<double>& v_xx) const {
+    const MatrixX<double>& a = at_.a[k];
+    const MatrixX<double>& b = at_.b[k];
+    const CostExpansion& cost = at_.cost[k];
+    StepQuadratic q{cost.x + a.transpose() * v_x, cost.u + b.transpose() * v_x,
+                    cost.xx + a.transpose() * v_xx * a, cost.ux + b.transpose() * v_xx * a,
+                    cost.uu + b.transpose() * v_xx * b};
+    if (!curvature_.empty()) {
+      q.xx += curvature_[k].topLeftCorner(n_, n_);
+      q.ux += curvature_[k].bottomLeftCorner(m_, n_);
+      q.uu += curvature_[k].bottomRightCorner(m_, m_);
+    }
+    return q;
   }
 
   // The controls of step k. Controls that neither move nor cost anything in it stay as they are:
@@ -364,7 +397,7 @@ class Solver {
     Plan tried = plan;
     const double rounding = kCostRounding * std::abs(plan.cost);
     if (options_.reference_extension) reference_.emplace(p_.map, p_.first_step, plan);
-    for (int j = 0; j < kShares; ++j) {
+    for (int j = secants_ ? std::max(0, last_share_ - kLargerShares) : 0; j < kShares; ++j) {
       const double share = ShareOf(j);
       const double expected = share * linear_ + share * share * quadratic_;
       if (!(expected < 0.0) || !RollOut(plan, &new_gains_, share, &tried)) continue;
@@ -375,12 +408,41 @@ class Solver {
       Linearisation there;
       if (!Linearise(tried, &there)) continue;
       if (!decreases && !Improves(there, tried)) return 0.0;
+      if (secants_) LearnCurvature(share, tried, there);
+      last_share_ = j;
       plan = tried;
       plan.gains = new_gains_;
       at_ = std::move(there);
       return share;
     }
+    last_share_ = 0;
     return 0.0;
+  }
+
+  // What H is missing along the step to another plan, with its costates.
+  void LearnCurvature(double share, const Plan& tried, const Linearisation& there) {
+    if (share < kSecantShare) {
+      curvature_.clear();
+      return;
+    }
+    const Plan& plan = result_.plan;
+    const long steps = plan.controls.rows();
+    if (curvature_.empty()) curvature_.assign(steps, MatrixX<double>::Zero(n_ + m_, n_ + m_));
+    RowMatrixXd costates, gradient;
+    Gradient(there, &costates, &gradient);
+    VectorX<double> change(n_ + m_), gradient_change(n_ + m_);
+    for (long k = 0; k < steps; ++k) {
+      const VectorX<double> costate = costates.row(k + 1);
+      const VectorX<double> dx = (tried.states.row(k) - plan.states.row(k)).transpose();
+      const VectorX<double> du = (tried.controls.row(k) - plan.controls.row(k)).transpose();
+      const CostExpansion& cost = there.cost[k];
+      change << dx, du;
+      gradient_change << (there.a[k] - at_.a[k]).transpose() * costate + cost.x - at_.cost[k].x -
+                             cost.xx * dx - cost.ux.transpose() * du,
+          (there.b[k] - at_.b[k]).transpose() * costate + cost.u - at_.cost[k].u - cost.ux * dx -
+              cost.uu * du;
+      LearnFromSecant(change, gradient_change, &curvature_[k]);
+    }
   }
 
   // Whether the gradient at another plan is smaller.
@@ -415,15 +477,17 @@ class Solver {
 
   const ControlProblem& p_;
   const IlqrOptions& options_;
+  const bool secants_;
   int n_, m_;
   IlqrResult result_;
   Linearisation at_;
   RowMatrixXd costates_, gradient_;
-  std::vector<MatrixX<double>> curvature_;
+  std::vector<MatrixX<double>> curvature_;  // of each step; empty: left out
   bool curvature_valid_ = false;
   std::optional<ExtendedReference> reference_;  // of the plan, in a search
   std::vector<VectorX<double>> forward_;
   std::vector<MatrixX<double>> new_gains_;
+  int last_share_ = 0;                     // the number of the last fraction that was accepted
   double linear_ = 0.0, quadratic_ = 0.0;  // of the expected change of the cost
   double shift_ = 0.0, growth_ = 1.0;
   double met_ = 0.0;  // the cost below which the target is met
@@ -496,6 +560,7 @@ IlqrResult SolveIlqr(const ControlProblem& problem, const RowMatrixXd& controls,
   if (options.surrogate.samples == 0) return Solver(problem, exact).Solve(controls);
   IlqrOptions sampled = options;
   sampled.max_iterations = std::max(1, options.max_iterations / 2);
+  sampled.secants = false;  // sampled Jacobians are not the derivatives of one function
   const IlqrResult first = Solver(problem, sampled).Solve(controls);
   const auto spent = static_cast<long>(first.iterations.size());
   if (first.status == IlqrStatus::kFailed || first.status == IlqrStatus::kStopped) {

@@ -14,7 +14,18 @@
 //
 // (Li, Todorov 2004; Tassa, Mansard, Todorov 2014). With second order Σ λᵢ ∂²fᵢ is added to Q, λ
 // the costate, by central differences of A and B: differential dynamic programming, which converges
-// quadratically where the cost's curvature does not vanish.
+// quadratically where the cost's curvature does not vanish. With secants that sum, and what the
+// Gauss-Newton approximation of the cost leaves out, is instead learnt from the plans before, by a
+// symmetric change of rank one in each step after an iteration from (x, u) to (x', u'):
+//
+//   s = (x', u') − (x, u),  y = (ℓ_x' + A'ᵀ λ', ℓ_u' + B'ᵀ λ') − (ℓ_x + Aᵀ λ', ℓ_u + Bᵀ λ') − L s
+//   H ← H + r rᵀ / (rᵀ s),  r = y − H s           L the Gauss-Newton Hessian of ℓ
+//
+// (Nocedal, Wright, "Numerical Optimization", 2nd edition, equation 6.24, in the parts of a
+// partially separable function, section 7.4). It takes no further linearisation. It begins with a
+// step α >= kSecantShare and ends with a smaller one; where a step's Q_uu is not positive definite
+// with H, H = 0 there, and where the line search fails with H it is repeated without. A line search
+// begins two fractions above the last that was accepted.
 //
 // The shift μ grows while a backward pass is not convex or its step does not decrease the cost, and
 // falls otherwise. In steps where a control neither moves nor costs anything it stays as it was.
@@ -58,6 +69,8 @@ struct IlqrOptions {
   /// this fraction of the cost.
   double gradient_tolerance = kGradientTolerance;
   bool second_order = false;
+  /// Curvature from secants; without effect with second_order, which is exact.
+  bool secants = false;
   /// Where a run has an impact earlier or later than the plan, the feedback is relative to the
   /// plan's motion extended across the impact (reference_extension.h), and not to states on its
   /// other side.

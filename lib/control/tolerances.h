@@ -38,6 +38,12 @@ inline constexpr double kMovesNothing = 1e-12;
 inline constexpr double kRedundantShare = 1e-9;
 /// Of the variable, at least 1: step of central differences of exact Jacobians: cube root of ε.
 inline constexpr double kSecondDifference = 6e-6;
+/// Of a whole step: after a step that is larger the plan is in the reach of one quadratic, and
+/// secants along its steps tell about its curvature.
+inline constexpr double kSecantShare = 0.3;
+/// Of the lengths of a change and of what a secant lacks along it: with a smaller product of the
+/// two the change of rank one is not determined (the skipping rule of Nocedal and Wright).
+inline constexpr double kSecantAngle = 1e-8;
 /// Of the planned cost: a plan whose motion costs more than this above it does not hold. The
 /// integration errors of fixed steps that do hold are below it.
 inline constexpr double kMotionShare = 0.05;

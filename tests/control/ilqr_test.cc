@@ -205,6 +205,53 @@ TEST(Ilqr, SecondOrderConvergesQuadratically) {
   EXPECT_GT(order, 1.6);
 }
 
+// Secants find the same minimum in fewer iterations, at one linearisation each, and the last steps
+// converge faster than linearly.
+TEST(Ilqr, SecantsConvergeFasterAtNoFurtherLinearisation) {
+  Pendulum map;
+  const Cost cost = SwingUp();
+  const ControlProblem problem = ProblemOf(&map, &cost, VectorX<double>::Zero(2), kInfinity);
+  IlqrOptions options{.max_iterations = 500, .gradient_tolerance = 1e-10};
+  const IlqrResult first = SolveIlqr(problem, RowMatrixXd::Constant(150, 1, 0.5), options);
+  options.secants = true;
+  const IlqrResult second = SolveIlqr(problem, RowMatrixXd::Constant(150, 1, 0.5), options);
+  ASSERT_EQ(second.status, IlqrStatus::kConverged) << second.message;
+  EXPECT_NEAR(second.plan.cost, first.plan.cost, 1e-9 * first.plan.cost);
+  std::printf("%zu iterations, of first order %zu\n", second.iterations.size(),
+              first.iterations.size());
+  for (const IlqrIteration& iteration : second.iterations) std::printf("%.1e ", iteration.gradient);
+  EXPECT_LT(3 * second.iterations.size(), 2 * first.iterations.size());
+  EXPECT_LE(second.linearisations, static_cast<long>(second.iterations.size()) + 2);
+}
+
+// Where controls are at their bounds the same holds.
+TEST(Ilqr, SecantsWithBoundsEndAtTheSameMinimum) {
+  Pendulum map;
+  const Cost cost = SwingUp();
+  const ControlProblem problem = ProblemOf(&map, &cost, VectorX<double>::Zero(2), 4.0);
+  IlqrOptions options{.max_iterations = 1000};
+  const IlqrResult first = SolveIlqr(problem, RowMatrixXd::Constant(150, 1, 0.5), options);
+  options.secants = true;
+  const IlqrResult second = SolveIlqr(problem, RowMatrixXd::Constant(150, 1, 0.5), options);
+  ASSERT_EQ(second.status, IlqrStatus::kConverged) << second.message;
+  std::printf("cost %.9f in %zu iterations, of first order %.9f in %zu\n", second.plan.cost,
+              second.iterations.size(), first.plan.cost, first.iterations.size());
+  EXPECT_LE(second.plan.cost, first.plan.cost * (1.0 + 1e-6));
+}
+
+// Second order is exact, and secants add nothing to it.
+TEST(Ilqr, SecantsHaveNoEffectWithSecondOrder) {
+  Pendulum map;
+  const Cost cost = SwingUp();
+  const ControlProblem problem = ProblemOf(&map, &cost, VectorX<double>::Zero(2), kInfinity);
+  IlqrOptions options{.max_iterations = 10, .second_order = true};
+  const IlqrResult exact = SolveIlqr(problem, RowMatrixXd::Constant(150, 1, 0.5), options);
+  options.secants = true;
+  const IlqrResult both = SolveIlqr(problem, RowMatrixXd::Constant(150, 1, 0.5), options);
+  EXPECT_EQ(both.plan.controls, exact.plan.controls);
+  EXPECT_EQ(both.rollouts, exact.rollouts);
+}
+
 TEST(Ilqr, MistakesAreNamed) {
   Pendulum map;
   const Cost cost = SwingUp();

@@ -238,6 +238,18 @@ TEST_F(TangibleControlTest, WarnsOfAnImpactThatOnlyPlansHave) {
   }
 }
 
+// Of a linear motion secants have nothing to add; both are accepted.
+TEST_F(TangibleControlTest, SecondOrderIsAFlagOrSecants) {
+  const json plain = json::parse(Control(Problem(kBounded)).out);
+  for (const char* value : {"true", "false", R"("secants")"}) {
+    const ProgramRun run = Control(Problem(kBounded, std::string(R"(, "second_order": )") + value));
+    ASSERT_EQ(run.exit_status, 0) << run.error;
+    const json result = json::parse(run.out);
+    EXPECT_EQ(result["status"], "converged") << value;
+    EXPECT_NEAR(result["cost"].get<double>(), plain["cost"].get<double>(), 1e-6) << value;
+  }
+}
+
 // Starts and samples are named in the result, which does not depend on the number of threads.
 TEST_F(TangibleControlTest, StartsAndSamplingAreOfTheProblem) {
   const std::string problem = Problem(kBounded, R"(, "starts": {"count": 3, "pieces": 2, "seed": 5},
@@ -314,6 +326,9 @@ TEST_F(TangibleControlTest, MistakesOfSearchesAreOneLine) {
   ExpectOneLine(Control(Problem(kBounded, R"(, "starts": {"count": 2, "pieces": 0})")), 1,
                 "/starts/pieces: expected");
   ExpectOneLine(Control(Problem(kBounded, R"(, "starts": "many")")), 1, "/starts: expected");
+  ExpectOneLine(Control(Problem(kBounded, R"(, "second_order": "newton")")), 1,
+                "/second_order: expected");
+  ExpectOneLine(Control(Problem(kBounded, R"(, "second_order": 1)")), 1, "/second_order: expected");
   ExpectOneLine(Control(Problem(kBounded, R"(, "sampling": {"method": "annealing"})")), 1,
                 "/sampling/method: expected");
   ExpectOneLine(Control(Problem(kBounded, R"(, "sampling": {"method": "mppi", "samples": 1})")), 1,
