@@ -78,6 +78,8 @@ DEFINE_int32(posterior_chains, 4, "of --posterior, each with a start of its own"
 DEFINE_int32(posterior_warm_up, 200, "transitions of each chain before its draws");
 DEFINE_int32(posterior_seed, 0, "of the draws");
 DEFINE_double(posterior_target, 0.8, "mean acceptance; nearer to 1: shorter steps");
+DEFINE_int32(posterior_temperatures, 1,
+             "of each chain, 1, 2, 4, ...: more pass between modes, and take as much more time");
 DEFINE_string(posterior_samples, "", "file of the draws (CSV); empty: none is written");
 DEFINE_string(posterior_scenes, "", "folder of a scene for each draw; empty: none is written");
 DEFINE_string(posterior_bands, "", "file of quantiles of predictions over draws (CSV)");
@@ -190,10 +192,12 @@ std::string ReadPosterior(std::optional<PosteriorOptions>* options) {
   if (draws.size() != 1) {
     return "--posterior: expected a whole number from 1 to 1000000, got '" + FLAGS_posterior + "'";
   }
-  std::string error = FirstOutside({{"--posterior_chains", FLAGS_posterior_chains, 1, 64},
-                                    {"--posterior_warm_up", FLAGS_posterior_warm_up, 0, 1e6},
-                                    {"--posterior_seed", FLAGS_posterior_seed, 0},
-                                    {"--posterior_target", FLAGS_posterior_target, 0.01, 0.999}});
+  std::string error = FirstOutside(
+      {{"--posterior_chains", FLAGS_posterior_chains, 1, 64},
+       {"--posterior_warm_up", FLAGS_posterior_warm_up, 0, 1e6},
+       {"--posterior_seed", FLAGS_posterior_seed, 0},
+       {"--posterior_temperatures", FLAGS_posterior_temperatures, 1, kMostTemperatures},
+       {"--posterior_target", FLAGS_posterior_target, 0.01, 0.999}});
   if (!error.empty()) return error;
   *options = {draws[0],
               FLAGS_posterior_chains,
@@ -201,6 +205,7 @@ std::string ReadPosterior(std::optional<PosteriorOptions>* options) {
               FLAGS_posterior_target,
               static_cast<unsigned>(FLAGS_posterior_seed),
               FLAGS_threads};
+  (*options)->temperatures = FLAGS_posterior_temperatures;
   const std::string folder =
       FLAGS_posterior_scenes.empty() ? "" : CheckSceneFolder(FLAGS_posterior_scenes);
   return folder.empty() ? "" : "--posterior_scenes: " + folder;

@@ -51,6 +51,7 @@ struct FinishedChain {
   int saturated = 0;
   double step = 0.0;
   double acceptance = 0.0;
+  double exchanged = 1.0;
   long evaluations = 0;
   std::string message;  ///< why there are no draws, or empty
 };
@@ -194,8 +195,8 @@ void VisitFields(FinishedProfile& profile, const Visitor& visit) {
 
 template <typename Visitor>
 void VisitFields(FinishedChain& chain, const Visitor& visit) {
-  auto& [estimate, parameters, costs, divergences, saturated, step, acceptance, evaluations,
-         message] = chain;
+  auto& [estimate, parameters, costs, divergences, saturated, step, acceptance, exchanged,
+         evaluations, message] = chain;
   visit("estimate", estimate);
   visit("parameters", parameters);
   visit("costs", costs);
@@ -203,6 +204,7 @@ void VisitFields(FinishedChain& chain, const Visitor& visit) {
   visit("saturated", saturated);
   visit("step", step);
   visit("acceptance", acceptance);
+  visit("exchanged", exchanged);
   visit("evaluations", evaluations);
   visit("message", message);
 }

@@ -253,9 +253,19 @@ void AddWarnings(const std::vector<ParameterEntry>& entries, const FitResult& re
   const size_t apart = worst([&](size_t a, size_t b) { return !(of[a].r_hat <= of[b].r_hat); });
   const double most = kMixed + kMixedByChance / posterior->transitions;
   if (!(of[apart].r_hat <= most)) {
-    warnings.push_back("posterior: the chains do not agree: R-hat of '" + entries[apart].name +
-                       "' is " + CompactNumber(of[apart].r_hat, 4) + ", expected at most " +
-                       CompactNumber(most, 4));
+    warnings.push_back(
+        "posterior: the chains do not agree: R-hat of '" + entries[apart].name + "' is " +
+        CompactNumber(of[apart].r_hat, 4) + ", expected at most " + CompactNumber(most, 4) +
+        (posterior->options.temperatures == 1
+             ? "; where there are several modes --posterior_temperatures lets chains "
+               "pass between them"
+             : ""));
+  }
+  if (posterior->exchanged < kLeastExchanged) {
+    warnings.push_back(
+        "posterior: replicas at neighbouring temperatures exchange their points in " +
+        CompactNumber(100.0 * posterior->exchanged, 2) +
+        " % of the cases only: modes may be missing");
   }
   const auto least = [&](size_t k) { return std::min(of[k].ess_bulk, of[k].ess_tail); };
   const size_t few = worst([&](size_t a, size_t b) { return !(least(a) >= least(b)); });
@@ -305,6 +315,7 @@ class ChainRunner {
       nuts.warm_up = options_.warm_up;
       nuts.draws = DrawsOfChain(options_);
       nuts.target = options_.target;
+      nuts.temperatures = options_.temperatures;
       nuts.progress = [this] {
         const std::lock_guard<std::mutex> lock(mutex_);
         if (show_) show_(++done_);
@@ -325,6 +336,7 @@ class ChainRunner {
                made.saturated,
                made.step,
                made.acceptance,
+               made.exchanged,
                made.evaluations,
                made.message};
       for (Eigen::Index i = 0; i < chain.costs.size(); ++i) {
@@ -526,6 +538,7 @@ bool SamplePosterior(const PosteriorOptions& options, const FitOptions& fit,
     posterior->saturated += chains[j].saturated;
     posterior->steps.push_back(chains[j].step);
     posterior->acceptance += chains[j].acceptance / options.chains;
+    posterior->exchanged = std::min(posterior->exchanged, chains[j].exchanged);
     posterior->evaluations += chains[j].evaluations;
     least_cost = std::min(least_cost, chains[j].costs.minCoeff());
   }

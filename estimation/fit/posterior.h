@@ -37,6 +37,9 @@
 
 namespace tangible {
 
+/// Hotter replicas are next to those of a constant density.
+inline constexpr int kMostTemperatures = 32;
+
 struct PosteriorOptions {
   int draws = 1000;     ///< N, of all chains together
   int chains = 4;       ///< each makes ⌈max(N, least_draws) / chains⌉, of which N are kept
@@ -46,6 +49,7 @@ struct PosteriorOptions {
   int threads = 0;  ///< 0: one a core. The result does not depend on it
   /// Draws that all chains together make at least: statistics of fewer would say little.
   int least_draws = 1000;
+  int temperatures = 1;  ///< of each chain (nuts.h): more pass between modes, and take as much more
 };
 
 struct Posterior {
@@ -59,6 +63,7 @@ struct Posterior {
   int saturated = 0;                        ///< of these, at the largest number of steps
   std::vector<double> steps;                ///< of each chain
   double acceptance = 0.0;                  ///< mean
+  double exchanged = 1.0;                   ///< the least of a chain (NutsChain)
   long evaluations = 0;                     ///< of the cost with its gradient
   double seconds = 0.0;
   std::vector<std::string> warnings;

@@ -120,13 +120,22 @@ OrderedJson PosteriorToJson(const std::vector<ParameterEntry>& entries,
                           {"ess_bulk", Finite(of.ess_bulk)},
                           {"ess_tail", Finite(of.ess_tail)}});
   }
-  return {{"draws", posterior.draws.rows()},    {"transitions", posterior.transitions},
-          {"chains", posterior.options.chains}, {"warm_up", posterior.options.warm_up},
-          {"seed", posterior.options.seed},     {"target", posterior.options.target},
-          {"parameters", parameters},           {"divergences", posterior.divergences},
-          {"saturated", posterior.saturated},   {"acceptance", Finite(posterior.acceptance)},
-          {"steps", posterior.steps},           {"evaluations", posterior.evaluations},
-          {"seconds", posterior.seconds},       {"warnings", posterior.warnings}};
+  return {{"draws", posterior.draws.rows()},
+          {"transitions", posterior.transitions},
+          {"chains", posterior.options.chains},
+          {"warm_up", posterior.options.warm_up},
+          {"seed", posterior.options.seed},
+          {"target", posterior.options.target},
+          {"parameters", parameters},
+          {"divergences", posterior.divergences},
+          {"saturated", posterior.saturated},
+          {"acceptance", Finite(posterior.acceptance)},
+          {"temperatures", posterior.options.temperatures},
+          {"exchanged", Finite(posterior.exchanged)},
+          {"steps", posterior.steps},
+          {"evaluations", posterior.evaluations},
+          {"seconds", posterior.seconds},
+          {"warnings", posterior.warnings}};
 }
 
 std::string PosteriorCsv(const std::vector<ParameterEntry>& entries, const Posterior& posterior) {

@@ -104,27 +104,80 @@ std::vector<int> EndsOfWindows(int warm_up) {
   return ends;
 }
 
+/// One replica, of π^β.
 class Sampler {
  public:
-  Sampler(const LogDensity& density, const Eigen::MatrixXd& factor, const NutsOptions& options,
-          RandomStream* random)
-      : density_(density), options_(options), random_(random), factor_(factor) {}
+  Sampler(const LogDensity& density, double beta, const Eigen::MatrixXd& factor,
+          const NutsOptions& options, RandomStream* random)
+      : density_(density),
+        beta_(beta),
+        options_(options),
+        random_(random),
+        factor_(factor / std::sqrt(beta)),
+        ends_(EndsOfWindows(options.warm_up)),
+        averaging_(options.target) {}
 
-  NutsChain Run(const Eigen::VectorXd& start) {
+  /// False where the density is 0 or not known there.
+  bool Begin(const Eigen::VectorXd& start) {
     now_.x = start;
-    if (!Evaluate(&now_)) {
-      chain_.message = "the density at the start is 0 or not known";
-      return std::move(chain_);
-    }
-    if (WarmUp()) Draw();
-    return std::move(chain_);
+    if (!Evaluate(&now_)) return false;
+    step_ = FirstStep(1.0);
+    averaging_.Restart(step_);
+    return true;
   }
+
+  /// Transition i of the warm-up, which learns.
+  void WarmUp(int i) {
+    Transition(step_);
+    step_ = averaging_.Learn(Acceptance());
+    if (i >= std::min(75, (15 * options_.warm_up) / 100)) window_.push_back(now_.x);
+    if (next_end_ < ends_.size() && i + 1 == ends_[next_end_]) {
+      Learn(window_);
+      window_.clear();
+      ++next_end_;
+      step_ = FirstStep(averaging_.MeanStep());
+      averaging_.Restart(step_);
+    }
+  }
+
+  void EndWarmUp() {
+    if (averaging_.HasLearnt()) step_ = averaging_.MeanStep();
+  }
+
+  void Draw() { Transition(step_); }
+
+  /// (4). Whether it was accepted.
+  static bool Exchange(Sampler* a, Sampler* b, RandomStream* random) {
+    const double gain = (a->beta_ - b->beta_) * (b->log_density() - a->log_density());
+    if (!(std::log(random->Uniform()) < gain)) return false;
+    std::swap(a->now_, b->now_);
+    for (Sampler* const one : {a, b}) {
+      // What the other one knew is of its own power.
+      const double power = one->beta_ / (one == a ? b : a)->beta_;
+      one->now_.value *= power;
+      one->now_.gradient *= power;
+    }
+    return true;
+  }
+
+  const Eigen::VectorXd& x() const { return now_.x; }
+  double log_density() const { return now_.value / beta_; }  ///< ln π
+  double step() const { return step_; }
+  double Acceptance() const { return steps_ > 0 ? acceptance_ / steps_ : 0.0; }
+  bool diverged() const { return diverged_; }
+  bool saturated() const { return depth_ == options_.max_depth; }
+  long evaluations() const { return evaluations_; }
 
  private:
   bool Evaluate(Place* place) {
-    ++chain_.evaluations;
-    return density_(place->x, &place->value, &place->gradient) && std::isfinite(place->value) &&
-           place->gradient.allFinite();
+    ++evaluations_;
+    if (!density_(place->x, &place->value, &place->gradient) || !std::isfinite(place->value) ||
+        !place->gradient.allFinite()) {
+      return false;
+    }
+    place->value *= beta_;
+    place->gradient *= beta_;
+    return true;
   }
 
   static double Energy(const PhasePoint& point) {
@@ -197,8 +250,6 @@ class Sampler {
     }
   }
 
-  double Acceptance() const { return steps_ > 0 ? acceptance_ / steps_ : 0.0; }
-
   /// A step at which one leapfrog step is accepted about as often as wanted, near `step`.
   double FirstStep(double step) {
     constexpr int kMostDoublings = 60;
@@ -233,60 +284,102 @@ class Sampler {
     factor_ = (factor_.triangularView<Eigen::Lower>() * cholesky.Lower()).eval();
   }
 
-  /// False where the caller ends it.
-  bool WarmUp() {
-    const std::vector<int> ends = EndsOfWindows(options_.warm_up);
-    DualAveraging averaging(options_.target);
-    double step = FirstStep(1.0);
-    averaging.Restart(step);
-    std::vector<Eigen::VectorXd> window;
-    size_t next = 0;
-    const int first = std::min(75, (15 * options_.warm_up) / 100);
-    for (int i = 0; i < options_.warm_up; ++i) {
-      Transition(step);
-      step = averaging.Learn(Acceptance());
-      if (options_.progress && !options_.progress()) return false;
-      if (i >= first) window.push_back(now_.x);
-      if (next < ends.size() && i + 1 == ends[next]) {
-        Learn(window);
-        window.clear();
-        ++next;
-        step = FirstStep(averaging.MeanStep());
-        averaging.Restart(step);
-      }
-    }
-    chain_.step = averaging.HasLearnt() ? averaging.MeanStep() : step;
-    return true;
-  }
-
-  void Draw() {
-    chain_.draws.resize(options_.draws, now_.x.size());
-    chain_.log_density.resize(options_.draws);
-    int made = 0;
-    while (made < options_.draws) {
-      Transition(chain_.step);
-      chain_.draws.row(made) = now_.x;
-      chain_.log_density[made++] = now_.value;
-      chain_.divergences += diverged_ ? 1 : 0;
-      chain_.saturated += depth_ == options_.max_depth ? 1 : 0;
-      chain_.acceptance += Acceptance();
-      if (options_.progress && !options_.progress()) break;
-    }
-    chain_.draws.conservativeResize(made, Eigen::NoChange);
-    chain_.log_density.conservativeResize(made);
-    chain_.acceptance /= std::max(1, made);
-  }
-
   const LogDensity& density_;
+  const double beta_;
   const NutsOptions& options_;
   RandomStream* random_;
   Eigen::MatrixXd factor_;
   Place now_;
-  NutsChain chain_;
+  double step_ = 1.0;
+  long evaluations_ = 0;
+  // Of the warm-up.
+  std::vector<int> ends_;
+  size_t next_end_ = 0;
+  DualAveraging averaging_;
+  std::vector<Eigen::VectorXd> window_;
   // Of the transition under way.
   double energy_ = 0.0, acceptance_ = 0.0;
   int steps_ = 0, depth_ = 0;
   bool diverged_ = false;
+};
+
+/// The replicas of a chain.
+class Replicas {
+ public:
+  Replicas(const LogDensity& density, const Eigen::MatrixXd& factor, const NutsOptions& options,
+           RandomStream* random)
+      : options_(options), random_(random) {
+    samplers_.reserve(static_cast<size_t>(options.temperatures));
+    for (int k = 0; k < options.temperatures; ++k) {
+      samplers_.emplace_back(density, std::ldexp(1.0, -k), factor, options, random);
+    }
+    accepted_.assign(samplers_.size(), 0);
+    tried_.assign(samplers_.size(), 0);
+  }
+
+  NutsChain Run(const Eigen::VectorXd& start) {
+    NutsChain chain;
+    for (Sampler& sampler : samplers_) {
+      if (!sampler.Begin(start)) {
+        chain.message = "the density at the start is 0 or not known";
+        return chain;
+      }
+    }
+    if (WarmUp()) Draw(&chain);
+    chain.step = samplers_.front().step();
+    for (const Sampler& sampler : samplers_) chain.evaluations += sampler.evaluations();
+    return chain;
+  }
+
+ private:
+  /// False where the caller ends it.
+  bool WarmUp() {
+    for (int i = 0; i < options_.warm_up; ++i) {
+      for (Sampler& sampler : samplers_) sampler.WarmUp(i);
+      Exchange(i);
+      if (options_.progress && !options_.progress()) return false;
+    }
+    for (Sampler& sampler : samplers_) sampler.EndWarmUp();
+    accepted_.assign(samplers_.size(), 0);
+    tried_.assign(samplers_.size(), 0);
+    return true;
+  }
+
+  void Exchange(int i) {
+    for (size_t k = static_cast<size_t>(i % 2); k + 1 < samplers_.size(); k += 2) {
+      ++tried_[k];
+      accepted_[k] += Sampler::Exchange(&samplers_[k], &samplers_[k + 1], random_) ? 1 : 0;
+    }
+  }
+
+  void Draw(NutsChain* chain) {
+    Sampler& first = samplers_.front();
+    chain->draws.resize(options_.draws, first.x().size());
+    chain->log_density.resize(options_.draws);
+    int made = 0;
+    while (made < options_.draws) {
+      for (Sampler& sampler : samplers_) sampler.Draw();
+      chain->divergences += first.diverged() ? 1 : 0;
+      chain->saturated += first.saturated() ? 1 : 0;
+      chain->acceptance += first.Acceptance();
+      Exchange(made);
+      chain->draws.row(made) = first.x();
+      chain->log_density[made++] = first.log_density();
+      if (options_.progress && !options_.progress()) break;
+    }
+    chain->draws.conservativeResize(made, Eigen::NoChange);
+    chain->log_density.conservativeResize(made);
+    chain->acceptance /= std::max(1, made);
+    for (size_t k = 0; k + 1 < samplers_.size(); ++k) {
+      chain->exchanged =
+          std::min(chain->exchanged, static_cast<double>(accepted_[k]) / std::max(1, tried_[k]));
+    }
+  }
+
+  const NutsOptions& options_;
+  RandomStream* random_;
+  std::vector<Sampler> samplers_;
+  std::vector<int> accepted_, tried_;  ///< of the replicas k and k + 1
 };
 
 }  // namespace
@@ -322,7 +415,7 @@ Eigen::VectorXd RandomStream::Normals(Eigen::Index size) {
 NutsChain SampleNuts(const LogDensity& density, const Eigen::VectorXd& start,
                      const Eigen::MatrixXd& factor, const NutsOptions& options,
                      RandomStream* random) {
-  return Sampler(density, factor, options, random).Run(start);
+  return Replicas(density, factor, options, random).Run(start);
 }
 
 }  // namespace tangible

@@ -21,12 +21,22 @@
 // draws of windows, each twice as long as the one before, drawn towards the L before it where the
 // draws are few.
 //
+// Where the density has several modes a chain seldom leaves the one in which it began. With K
+// temperatures it consists of K replicas, of π^β with β = 1, 1/2, 1/4, ...: hot ones pass between
+// modes. After each transition neighbours i and i + 1, with i even and odd in turn, exchange their
+// points with the probability
+//
+//   min(1, exp((β_i − β_{i+1}) (ln π(x_{i+1}) − ln π(x_i))))                                (4)
+//
+// which keeps all of their densities; the draws are those of the first.
+//
 // One chain uses one stream of random numbers, made here, so that the same seed gives the same
 // bits wherever and beside whatever other chains it runs.
 //
 // References: M. D. Hoffman and A. Gelman, Journal of Machine Learning Research 15 (2014) 1593
 // (the sampler, dual averaging); M. Betancourt, arXiv 1701.02434 (2017), appendix A (weights of
-// states, (3)); Stan Reference Manual 2.30, "HMC Algorithm Parameters" (windows of the warm-up).
+// states, (3)); Stan Reference Manual 2.30, "HMC Algorithm Parameters" (windows of the warm-up);
+// C. J. Geyer, Computing Science and Statistics 23 (1991) 156 (replicas, (4)).
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -55,10 +65,11 @@ class RandomStream {
 };
 
 struct NutsOptions {
-  int warm_up = 200;    ///< transitions whose draws are not kept
-  int draws = 250;      ///< that are kept
-  int max_depth = 10;   ///< a transition has at most 2^max_depth − 1 steps
-  double target = 0.8;  ///< mean acceptance, in (0, 1)
+  int warm_up = 200;     ///< transitions whose draws are not kept
+  int draws = 250;       ///< that are kept
+  int max_depth = 10;    ///< a transition has at most 2^max_depth − 1 steps
+  double target = 0.8;   ///< mean acceptance, in (0, 1)
+  int temperatures = 1;  ///< K
   /// Called after each transition; false ends the chain early. May be empty.
   std::function<bool()> progress;
 };
@@ -70,6 +81,9 @@ struct NutsChain {
   int saturated = 0;            ///< of these that ended at max_depth
   double step = 0.0;            ///< ε after the warm-up
   double acceptance = 0.0;      ///< mean, of the transitions that are kept
+  /// The share of exchanges that were accepted, after the warm-up, of the neighbours with the
+  /// least; 1 with one temperature.
+  double exchanged = 1.0;
   long evaluations = 0;
   std::string message;  ///< why there are no draws, or empty
 };

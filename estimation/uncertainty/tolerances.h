@@ -60,5 +60,8 @@ inline constexpr double kDivergent = 1000.0;
 inline constexpr double kMixed = 1.01;
 /// Draws: a quantile from fewer effective ones is not to be trusted (the same, for four chains).
 inline constexpr double kLeastEffective = 400.0;
+/// Of 1: replicas that exchange their points in a smaller share of the cases do not pass on what
+/// the hot ones find.
+inline constexpr double kLeastExchanged = 0.05;
 
 }  // namespace tangible

@@ -403,11 +403,12 @@ void BindFit(py::module_* module) {
               const std::vector<std::string>& profiles, const std::vector<std::string>& starts_done,
               const std::vector<std::string>& profiles_done, const std::string& design,
               const std::string& design_name, bool missing,
-              const std::optional<std::tuple<int, int, int, double, unsigned>>& sampling) {
+              const std::optional<std::tuple<int, int, int, double, unsigned, int>>& sampling) {
              std::optional<PosteriorOptions> options;
              if (sampling) {
-               const auto& [draws, chains, warm_up, target, seed] = *sampling;
+               const auto& [draws, chains, warm_up, target, seed, temperatures] = *sampling;
                options = {draws, chains, warm_up, target, seed};
+               options->temperatures = temperatures;
              }
              return fit.Run({max_iterations,
                              predict_from,

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <sstream>
+#include <vector>
 
 #include "fit_fixture.h"
 
@@ -129,6 +130,59 @@ TEST_F(TangibleFitPosteriorTest, RecordingsHaveAsManyScenes) {
   EXPECT_EQ(Read(Path("p.csv")).substr(0, 44), "draw,chain,cost,g,speed of a,speed of b\n0,0,");
   EXPECT_TRUE(std::filesystem::exists(Path("s/scene_002_1.json")));
   EXPECT_FALSE(std::filesystem::exists(Path("s/scene_002_2.json")));
+}
+
+// Distances from a post do not tell on which side of it the ball flies: chains stay on one side, and
+// with temperatures they pass to the other.
+TEST_F(TangibleFitPosteriorTest, TemperaturesFindTheOtherMode) {
+  json scene = json::parse(Read(Path("scene.json")));
+  scene["bodies"].push_back({{"name", "post"}, {"static", true}, {"position", {0.0, 0.0}}});
+  Write("scene.json", scene.dump());
+  std::string text = "time,body,relative_to,distance\n";
+  for (int k = 5; k <= 50; k += 5) {
+    text += json(0.01 * k).dump() + ",ball,post," +
+            json(std::hypot(0.02 * k, Height(k)) + (k % 10 == 0 ? 0.02 : -0.02)).dump() + "\n";
+  }
+  Write("o.csv", text);
+  json fit = Problem();
+  fit["observations"][0]["sigma"] = 0.1;
+  fit["parameters"] = {{{"name", "speed"},
+                        {"initial", 1.5},
+                        {"lower", -5},
+                        {"upper", 5},
+                        {"path", "bodies/ball/velocity/x"}}};
+  // The share of each chain's draws on the right.
+  const auto shares = [&](const std::string& flags) {
+    const ProgramRun run = Fit(fit, "--posterior=400 --posterior_warm_up=300 " + flags +
+                                        Flag("out", "r.json") + Flag("posterior_samples", "p.csv"));
+    EXPECT_EQ(run.exit_status, 0) << run.error;
+    std::istringstream lines(Read(Path("p.csv")));
+    std::string line;
+    std::getline(lines, line);
+    EXPECT_EQ(line, "draw,chain,cost,speed");
+    std::vector<double> of_chain(4, 0.0);
+    while (std::getline(lines, line)) {
+      const size_t chain = static_cast<size_t>(line[line.find(',') + 1] - '0');
+      of_chain.at(chain) += line[line.rfind(',') + 1] == '-' ? 0.0 : 0.01;
+    }
+    return of_chain;
+  };
+  for (const double share : shares("")) {
+    EXPECT_NEAR(share * (1.0 - share), 0.0, 1e-12) << share << ": a chain stays where it began";
+  }
+  EXPECT_EQ(json::parse(Read(Path("r.json")))["posterior"]["exchanged"], 1.0);
+  double all = 0.0;
+  for (const double share : shares("--posterior_temperatures=6")) {
+    EXPECT_NEAR(share, 0.5, 0.4);
+    all += 0.25 * share;
+  }
+  EXPECT_NEAR(all, 0.5, 0.2);
+  const json posterior = json::parse(Read(Path("r.json")))["posterior"];
+  EXPECT_EQ(posterior["temperatures"], 6);
+  EXPECT_GT(posterior["exchanged"].get<double>(), 0.1);
+  EXPECT_LT(posterior["parameters"][0]["interval_95"][0].get<double>(), -1.0);
+  ExpectOneLine(Fit(fit, "--posterior=9 --posterior_temperatures=0"), 2,
+                "--posterior_temperatures: expected");
 }
 
 TEST_F(TangibleFitPosteriorTest, BadFlags) {

@@ -201,6 +201,7 @@ def test_draws_from_the_posterior() -> None:
         ({"posterior": 0}, "^posterior: expected a whole number from 1 to 1000000, got 0$"),
         ({"posterior": True}, "^posterior: expected a whole number"),
         ({"posterior": 10, "posterior_chains": 65}, "^posterior_chains: .* from 1 to 64, got 65$"),
+        ({"posterior": 10, "posterior_temperatures": 0}, "^posterior_temperatures: .* from 1 to 32, got 0$"),
         ({"posterior": 10, "posterior_target": 1.0}, "^posterior_target: expected a number from 0.01"),
     ]:
         with pytest.raises(ValueError, match=said):

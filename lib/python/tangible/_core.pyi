@@ -92,7 +92,7 @@ class Fit:
     def run(
         self, arg0: int, arg1: float, arg2: bool, arg3: str, arg4: object, arg5: list[str],
         arg6: list[str], arg7: list[str], arg8: str, arg9: str, arg10: bool,
-        arg11: tuple[int, int, int, float, int] | None
+        arg11: tuple[int, int, int, float, int, int] | None
     ) -> tuple[str, str, str, list[Scene], str]: ...
 
 class Control:

@@ -415,20 +415,21 @@ def _read_draws(text: str) -> dict[str, Floats]:
 
 
 def _sampling(
-    draws: int | None, chains: int, warm_up: int, target: float, seed: int
-) -> tuple[int, int, int, float, int] | None:
+    draws: int | None, chains: int, warm_up: int, target: float, seed: int, temperatures: int
+) -> tuple[int, int, int, float, int, int] | None:
     """The options of draws from the posterior, as the core takes them."""
     if draws is None:
         return None
     for name, value, low, high in (
         ("posterior", draws, 1, 1_000_000), ("posterior_chains", chains, 1, 64),
         ("posterior_warm_up", warm_up, 0, 1_000_000), ("posterior_seed", seed, 0, 2**31 - 1),
+        ("posterior_temperatures", temperatures, 1, 32),
     ):
         if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not low <= value <= high:
             raise ValueError(f"{name}: expected a whole number from {low} to {high}, got {value}")
     if not 0.01 <= target <= 0.999:
         raise ValueError(f"posterior_target: expected a number from 0.01 to 0.999, got {target}")
-    return int(draws), int(chains), int(warm_up), float(target), int(seed)
+    return int(draws), int(chains), int(warm_up), float(target), int(seed), int(temperatures)
 
 
 def _start(problem: Problem, number: int, max_iterations: int, predict_from: float) -> str:
@@ -494,6 +495,7 @@ def fit(
     posterior_warm_up: int = 200,
     posterior_target: float = 0.8,
     posterior_seed: int = 0,
+    posterior_temperatures: int = 1,
     discretisation_check: bool = False,
     checkpoint: str | os.PathLike[str] | None = None,
     callback: Callable[[dict[str, Any]], object] | None = None,
@@ -539,6 +541,8 @@ def fit(
         posterior_chains, posterior_warm_up, posterior_target, posterior_seed: Of the draws: chains,
             each from a start of its own; transitions of each before its draws; mean acceptance, nearer
             to 1 with shorter steps; the seed.
+        posterior_temperatures: Of each chain, 1, 2, 4, ...: more pass between several modes, and take
+            as much more time.
         discretisation_check: Whether it is fitted with half the step too, which shows its bias.
         checkpoint: A file that keeps the fit's evaluations: where the fit is interrupted, the same
             call goes on from it, with the same bits.
@@ -576,7 +580,8 @@ def fit(
             callback(said)
 
     sampling = _sampling(
-        posterior, posterior_chains, posterior_warm_up, posterior_target, posterior_seed
+        posterior, posterior_chains, posterior_warm_up, posterior_target, posterior_seed,
+        posterior_temperatures,
     )
     made = _problem(problem, data, parameters, sigma, points, recordings, folder, initial, keys)
     end = math.inf if predict_from is None else float(predict_from)

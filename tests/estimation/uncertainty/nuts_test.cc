@@ -59,6 +59,44 @@ LogDensity GaussianDensity(const VectorXd& mean, const MatrixXd& covariance) {
   };
 }
 
+// Two modes, sixteen deviations apart, of which one has seven tenths: a chain never leaves the one
+// in which it began, but with temperatures, which leave the density as it is.
+TEST(NutsTest, TemperaturesPassBetweenModes) {
+  const VectorXd modes[2] = {Eigen::Vector2d(-8.0, 0.0), Eigen::Vector2d(8.0, 2.0)};
+  const double shares[2] = {0.3, 0.7};
+  const LogDensity density = [&](const VectorXd& x, double* value, VectorXd* gradient) {
+    double sum = 0.0;
+    gradient->setZero(2);
+    // About the nearer mode, so that neither underflows.
+    const double least = std::min((x - modes[0]).squaredNorm(), (x - modes[1]).squaredNorm());
+    for (int k = 0; k < 2; ++k) {
+      const VectorXd off = x - modes[k];
+      const double part = shares[k] * std::exp(0.5 * (least - off.squaredNorm()));
+      sum += part;
+      *gradient -= part * off;
+    }
+    *gradient /= sum;
+    *value = std::log(sum) - 0.5 * least;
+    return true;
+  };
+  NutsOptions options;
+  options.warm_up = 500;
+  options.draws = 4000;
+  const auto is_second = [](const VectorXd& x) { return x[0] > 0.0 ? 1.0 : 0.0; };
+  const MatrixXd factor = MatrixXd::Identity(2, 2);
+  EXPECT_EQ(Sample(density, modes[0], factor, options).Of(is_second).sum(), 0.0);
+  options.temperatures = 7;
+  const Sampled sampled = Sample(density, modes[0], factor, options);
+  ExpectMean(sampled.Of(is_second), 0.7, "the share of a mode");
+  ExpectMean(
+      sampled.Of([&](const VectorXd& x) { return (x - modes[x[0] > 0.0 ? 1 : 0]).squaredNorm(); }),
+      2.0, "the width of the modes");
+  for (const NutsChain& chain : sampled.chains) {
+    EXPECT_GT(chain.exchanged, 0.2);
+    EXPECT_LT(chain.exchanged, 1.0);
+  }
+}
+
 // Deviations from 0.01 to 100 with correlations, from a factor that knows nothing of them: the
 // windows of the warm-up find it. Moments and quantiles are those of the distribution.
 TEST(NutsTest, GaussianWithCorrelations) {
