@@ -132,8 +132,8 @@ TEST_F(TangibleFitPosteriorTest, RecordingsHaveAsManyScenes) {
   EXPECT_FALSE(std::filesystem::exists(Path("s/scene_002_2.json")));
 }
 
-// Distances from a post do not tell on which side of it the ball flies: chains stay on one side, and
-// with temperatures they pass to the other.
+// Distances from a post do not tell on which side of it the ball flies: chains stay on one side,
+// and with temperatures they pass to the other.
 TEST_F(TangibleFitPosteriorTest, TemperaturesFindTheOtherMode) {
   json scene = json::parse(Read(Path("scene.json")));
   scene["bodies"].push_back({{"name", "post"}, {"static", true}, {"position", {0.0, 0.0}}});
@@ -183,6 +183,20 @@ TEST_F(TangibleFitPosteriorTest, TemperaturesFindTheOtherMode) {
   EXPECT_LT(posterior["parameters"][0]["interval_95"][0].get<double>(), -1.0);
   ExpectOneLine(Fit(fit, "--posterior=9 --posterior_temperatures=0"), 2,
                 "--posterior_temperatures: expected");
+}
+
+TEST_F(TangibleFitPosteriorTest, ThreadsChangeNoBit) {
+  const auto result = [&](const std::string& flags) {
+    const ProgramRun run = Fit(Problem(), flags + " --posterior=20" + Flag("out", "r.json"));
+    EXPECT_EQ(run.exit_status, 0) << run.error;
+    return json::parse(Read(Path("r.json")), [](int, json::parse_event_t event, json& parsed) {
+      return event != json::parse_event_t::key || parsed != "seconds";
+    });
+  };
+  const json one = result("--threads=1");
+  EXPECT_EQ(result("--threads=3"), one);
+  EXPECT_EQ(result(""), one);
+  ExpectOneLine(Fit(Problem(), "--threads=-1"), 2, "--threads: expected");
 }
 
 TEST_F(TangibleFitPosteriorTest, BadFlags) {

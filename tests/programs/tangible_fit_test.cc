@@ -107,20 +107,6 @@ TEST_F(TangibleFitTest, FitsSeveralRecordingsAtOnce) {
   ExpectOneLine(Fit(fit), 1, "/initial: expected one of from_observations");
 }
 
-TEST_F(TangibleFitTest, ThreadsChangeNoBit) {
-  const auto result = [&](const std::string& flags) {
-    const ProgramRun run = Fit(Problem(), flags + " --out='" + Path("r.json") + "'");
-    EXPECT_EQ(run.exit_status, 0) << run.error;
-    return json::parse(Read(Path("r.json")), [](int, json::parse_event_t event, json& parsed) {
-      return event != json::parse_event_t::key || parsed != "seconds";
-    });
-  };
-  const json one = result("--threads=1");
-  EXPECT_EQ(result("--threads=3"), one);
-  EXPECT_EQ(result(""), one);
-  ExpectOneLine(Fit(Problem(), "--threads=-1"), 2, "--threads: expected");
-}
-
 TEST_F(TangibleFitTest, MistakesInRecordingsNameThem) {
   json fit = Problem();
   fit.erase("observations");
