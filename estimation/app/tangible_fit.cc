@@ -640,6 +640,20 @@ std::string CheckShardFlags(ShardPlan* plan) {
   return "";
 }
 
+/// Whether a fit may have chains, profiles or starts that can be divided, without its observations.
+bool MayHaveRows(const std::vector<std::string>& positional) {
+  if (!FLAGS_posterior.empty() || !FLAGS_profile.empty()) return true;
+  std::string text;
+  std::string error;
+  Json json;
+  if (!ReadTextFile(positional[0], &text, &error) ||
+      !ParseJson(text, positional[0], &json, &error) || !json.is_object()) {
+    return true;  // what is wrong is said where the fit is read
+  }
+  const auto starts = json.find("starts");
+  return starts != json.end() && *starts != 1;
+}
+
 int Main(int argc, char** argv) {
   const CommandLine line = ParseCommandLine(
       argc, argv,
@@ -663,6 +677,7 @@ int Main(int argc, char** argv) {
                    "posterior_bands"},
        .inputs = {"design"},
        .runs_in_step = true,
+       .may_have_rows = MayHaveRows,
        .schema = [] { return JsonText(FitSchema()); }});
   if (line.exit_status) return *line.exit_status;
   if (FLAGS_max_iterations < 1) {

@@ -333,7 +333,7 @@ CommandLine ParseCommandLine(int argc, char** argv, const ProgramInfo& info) {
       return line;
     }
   }
-  if (!SetRankPart(info)) line.exit_status = kExitFailed;
+  if (!SetRankPart(info, line.positional)) line.exit_status = kExitFailed;
   return line;
 }
 

@@ -49,6 +49,9 @@ struct ProgramInfo {
   /// Whether ranks of MPI that have no rows to divide run the program together, each with the same
   /// flags and files: it then divides its work by math/shared_work.h, and decides nothing by time.
   bool runs_in_step = false;
+  /// Of such a program: whether there may be rows to divide, by a look at its arguments that costs
+  /// little; none: there may.
+  std::function<bool(const std::vector<std::string>& positional)> may_have_rows{};
   /// The JSON Schema of the program's input, which --schema prints; none if empty.
   std::function<std::string()> schema{};
 };

@@ -32,8 +32,9 @@ namespace {
 
 // Shards for each rank: a rank that is slow, or has long rows, keeps the others waiting for less.
 constexpr int kShardsOfRank = 4;
-// How long a rank that waits sleeps before it looks for messages again.
-constexpr std::chrono::microseconds kNap(200);
+// How long a rank that waits sleeps before it looks for messages again. A question and its answer
+// take two of these.
+constexpr std::chrono::microseconds kNap(100);
 // How the names of shards' files begin, which exist in memory only.
 constexpr std::string_view kShardName = "rank-shard:";
 
@@ -387,10 +388,16 @@ class Ranks : public SharedWork {
 
   std::optional<std::string> AskForFile(const std::string& file, std::string* content) {
     const std::lock_guard<std::mutex> lock(mutex_);
+    if (const auto known = asked_.find(file); known != asked_.end()) {
+      *content = known->second;
+      return "";
+    }
     if (!ended_) messages_.send(0, kReadFile, file.data(), file.size());
     const std::string reply = Await(kReply).value_or("-the run has ended");
     *content = reply.substr(1);
-    return reply[0] == '+' ? "" : *content;
+    if (reply[0] != '+') return *content;
+    asked_[file] = *content;
+    return "";
   }
 
   const RankMessages& messages_;
@@ -401,7 +408,9 @@ class Ranks : public SharedWork {
   std::mutex mutex_;
   long next_ = 0;
   bool failed_ = false;
-  bool ended_ = false;                        ///< rank 0 has said so
+  bool ended_ = false;  ///< rank 0 has said so
+  /// Files that this rank has read: it reads them again for each shard, and the run together.
+  std::map<std::string, std::string> asked_;
   std::map<std::string, std::string> texts_;  ///< of shards, by the names of their files
   // Of a run together, on rank 0.
   std::vector<std::optional<std::string>> sent_;  ///< by rank
@@ -434,7 +443,7 @@ int RunOnRanks(int (*body)(int, char**), int argc, char** argv) {
   return exit_status;
 }
 
-bool SetRankPart(const ProgramInfo& info) {
+bool SetRankPart(const ProgramInfo& info, const std::vector<std::string>& positional) {
   const RankPart& part = Part();
   if (part.kind == RankPart::Kind::kWhole) return true;
   gflags::CommandLineFlagInfo flag;
@@ -449,6 +458,10 @@ bool SetRankPart(const ProgramInfo& info) {
   }
   // The whole run is made by rank 0 where nothing can be divided, or the user divides it.
   if (divides_itself) return false;
+  if (part.kind == RankPart::Kind::kShard && RunsInStep() && info.may_have_rows &&
+      !info.may_have_rows(positional)) {
+    return false;
+  }
   if (is_default("threads")) gflags::SetCommandLineOption("threads", "1");
   if (part.kind == RankPart::Kind::kMerge) {
     std::string files;

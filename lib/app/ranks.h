@@ -15,6 +15,7 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace tangible {
 
@@ -30,7 +31,7 @@ int RunOnRanks(int (*body)(int, char**), int argc, char** argv);
 
 /// Sets the flags that make it run a shard, or put the shards together. False where it cannot run a
 /// shard, which it then must not begin.
-bool SetRankPart(const ProgramInfo& info);
+bool SetRankPart(const ProgramInfo& info, const std::vector<std::string>& positional);
 /// Takes the text of a shard's file, or of any that another rank than 0 would write, which is
 /// written nowhere; false where it is to be written.
 bool TakeRankOutput(const std::string& path, std::string_view text);
