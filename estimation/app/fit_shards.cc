@@ -19,19 +19,17 @@ long RowsOf(const FitOptions& options, int chains) {
 
 std::string NothingToDivide() {
   return "expected a fit with \"starts\" above 1, --profile or --posterior, as these are divided; "
-         "got "
-         "none of them";
+         "got none of them";
 }
 
-/// The rows of a shard that are chains; what is wrong or empty.
+/// The rows of a shard that are chains; what is wrong with the file or empty.
 std::string WriteChains(const ChainsOfFit& chains, const Shard& shard, const std::string& out) {
   std::vector<int> numbers;
   for (long i = 0; i < shard.NumRows(chains.count); ++i) {
     numbers.push_back(static_cast<int>(shard.RowOf(i)));
   }
   std::vector<FinishedChain> made;
-  std::string error = numbers.empty() ? "" : chains.make(numbers, &made);
-  if (!error.empty()) return error;
+  if (!numbers.empty()) made = chains.make(numbers);
   OrderedJson json = {{"chains", OrderedJson::array()}};
   for (size_t i = 0; i < made.size(); ++i) {
     json["chains"].push_back({{"chain", numbers[i]},

@@ -15,12 +15,11 @@
 
 namespace tangible {
 
-/// The chains of a fit, and what makes some of them: none where there is no estimate; what is wrong
-/// or empty.
+/// The chains of a fit, and what makes some of them: none where there is no estimate, or no density
+/// to be sampled, which the merge says.
 struct ChainsOfFit {
   int count = 0;
-  std::function<std::string(const std::vector<int>& numbers, std::vector<FinishedChain>* chains)>
-      make;
+  std::function<std::vector<FinishedChain>(const std::vector<int>& numbers)> make;
 };
 
 /// Makes the rows of a shard and writes them to `out`. Returns what is wrong or empty: there is

@@ -474,23 +474,20 @@ MotionCheck CompareMotion(const Prepared& prepared, const FitResult& result) {
 /// The chains of a shard of --posterior, around the estimate of the whole fit.
 ChainsOfFit ChainsOf(Prepared* prepared) {
   if (!prepared->sampling) return {};
-  return {prepared->sampling->chains,
-          [prepared](const std::vector<int>& numbers, std::vector<FinishedChain>* chains) {
+  return {prepared->sampling->chains, [prepared](const std::vector<int>& numbers) {
+            std::vector<FinishedChain> chains;
             const FitOptions& options = prepared->fit.input.options();
             VarianceComponents components;
             const FitResult result =
                 FitWithComponents(options, prepared->problem.get(), {}, &components, {});
             ScaleObservations(components.noise, prepared);
-            if (result.estimate.size() == 0) return std::string();
+            if (result.estimate.size() == 0) return chains;
             const RecordingsProblem& problem = *prepared->problem;
             std::string error;
-            const bool made =
-                MakeChains(*prepared->sampling, options, result,
-                           FreeCoordinates(problem.entries(), problem.effects()),
-                           MakerOf(prepared->fit.input, problem), numbers, chains, &error);
-            // What is wrong is said by the merge, with the fit.
-            if (!made) chains->clear();
-            return std::string();
+            MakeChains(*prepared->sampling, options, result,
+                       FreeCoordinates(problem.entries(), problem.effects()),
+                       MakerOf(prepared->fit.input, problem), numbers, &chains, &error);
+            return chains;
           }};
 }
 
@@ -554,8 +551,9 @@ int Run(const std::string& text, const std::string& file, const ShardPlan& plan)
   }
   FitParts parts;
   FitPartLogs logs(&parts);
-  if (error.empty() && plan.IsMerge())
+  if (error.empty() && plan.IsMerge()) {
     error = MergeFitShards(options, ChainsOf(&prepared).count, plan, &parts);
+  }
   if (!error.empty()) return ReportError(error);
   IterationPrinter printer(prepared.problem->entries());
   const FitProgress progress = [&](int start, int iteration, const FitIteration& values) {

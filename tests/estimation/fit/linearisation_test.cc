@@ -3,10 +3,14 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <atomic>
+#include <barrier>
+#include <thread>
 
 #include "../../support/block_problem.h"
 #include "../../support/random_matrix.h"
+#include "tangible/math/shared_work.h"
 
 namespace tangible {
 namespace {
@@ -107,6 +111,98 @@ TEST(LinearizerTest, TheFirstBlockThatFailsIsNamed) {
   std::vector<BlockEvaluation> blocks;
   EXPECT_FALSE(linearizer.Rows(InitialOf(problem.entries()), BlockDerivatives::kSkip, &blocks));
   EXPECT_EQ(linearizer.message(), "block 1: fails");
+}
+
+constexpr int kProcesses = 3;
+
+/// Threads in the place of processes.
+struct Exchanged {
+  std::barrier<> all_here{kProcesses};
+  std::array<std::string, kProcesses> sent;
+};
+
+class ThreadsWork : public SharedWork {
+ public:
+  ThreadsWork(Exchanged* exchanged, int rank) : exchanged_(*exchanged), rank_(rank) {}
+  int rank() const override { return rank_; }
+  int size() const override { return kProcesses; }
+  std::vector<std::string> Exchange(const std::string& own) override {
+    exchanged_.sent[static_cast<size_t>(rank_)] = own;
+    exchanged_.all_here.arrive_and_wait();
+    std::vector<std::string> all(exchanged_.sent.begin(), exchanged_.sent.end());
+    exchanged_.all_here.arrive_and_wait();
+    return all;
+  }
+
+ private:
+  Exchanged& exchanged_;
+  const int rank_;
+};
+
+class CountedProblem : public DecayProblem {
+ public:
+  using DecayProblem::DecayProblem;
+  bool EvaluateBlock(int block, const Eigen::VectorXd& p, GradientMethod method,
+                     BlockDerivatives derivatives, BlockEvaluation* evaluation) override {
+    ++evaluations;
+    return DecayProblem::EvaluateBlock(block, p, method, derivatives, evaluation);
+  }
+  int evaluations = 0;
+};
+
+// Each process evaluates its share of the blocks, and all have the bits of one that evaluates all.
+TEST(LinearizerTest, ProcessesDivideTheBlocks) {
+  struct Result {
+    Linearisation current, target;
+    std::vector<BlockEvaluation> rows;
+    std::string message;
+    long rollouts = 0;
+    int evaluations = 0;
+  };
+  const auto evaluate = [](Result* result) {
+    CountedProblem problem(7, 1);
+    const Eigen::VectorXd q = ToInternal(problem.entries(), 1.1 * InitialOf(problem.entries()));
+    Linearizer linearizer(&problem, GradientMethod::kTangent, 1, nullptr);
+    EXPECT_TRUE(linearizer.Linearise(q, {2.0, 1.0}, &result->current, &result->target));
+    EXPECT_TRUE(
+        linearizer.Rows(InitialOf(problem.entries()), BlockDerivatives::kCompute, &result->rows));
+    result->rollouts = linearizer.rollouts();
+    result->evaluations = problem.evaluations;
+    problem.failing = {6, 4};
+    EXPECT_FALSE(linearizer.Linearise(q, {2.0, 1.0}, &result->current, &result->target));
+    result->message = linearizer.message();
+  };
+  Result alone;
+  evaluate(&alone);
+  EXPECT_EQ(alone.evaluations, 2 * 8);
+  Exchanged exchanged;
+  std::array<Result, kProcesses> results;
+  std::vector<std::thread> threads;
+  for (int rank = 0; rank < kProcesses; ++rank) {
+    threads.emplace_back([&, rank] {
+      ThreadsWork work(&exchanged, rank);
+      const SharedWork::Scope scope(&work);
+      evaluate(&results[static_cast<size_t>(rank)]);
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  int evaluations = 0;
+  for (const Result& result : results) {
+    // Seven blocks of 30 rows and one of a single row.
+    EXPECT_GE(result.evaluations, 2 * 2);
+    EXPECT_LE(result.evaluations, 2 * 3);
+    evaluations += result.evaluations;
+    EXPECT_EQ(result.rollouts, alone.rollouts);
+    EXPECT_EQ(result.current.cost, alone.current.cost);
+    EXPECT_EQ(result.target.gradient, alone.target.gradient);
+    ASSERT_EQ(result.rows.size(), alone.rows.size());
+    for (size_t block = 0; block < alone.rows.size(); ++block) {
+      EXPECT_EQ(result.rows[block].residuals, alone.rows[block].residuals);
+      EXPECT_EQ(result.rows[block].jacobian, alone.rows[block].jacobian);
+    }
+    EXPECT_EQ(result.message, "block 4: fails");
+  }
+  EXPECT_EQ(evaluations, alone.evaluations);
 }
 
 // The square of a residual may be beyond a double where the residual is not.
