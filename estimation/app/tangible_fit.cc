@@ -538,6 +538,54 @@ std::string PlanNext(const Prepared& prepared, const FitResult& result,
   return error;
 }
 
+/// What is found beside the estimate, each where it is asked for.
+struct Extras {
+  std::optional<Posterior> posterior;
+  std::optional<DiscretisationCheck> check;
+  std::optional<PredictedRecordings> later;
+  std::optional<HeldOutRuns> held_out;
+  std::optional<MissingResult> missing;
+  std::optional<Design> design;
+
+  [[nodiscard]] FitFindings View(const VarianceComponents& components) const {
+    const auto pointer = [](const auto& value) { return value ? &*value : nullptr; };
+    return {&components,       pointer(check),  pointer(later),  pointer(posterior),
+            pointer(held_out), pointer(design), pointer(missing)};
+  }
+};
+
+/// Finds and prints what is asked for beside the estimate of `result`, whose intervals become those
+/// of the draws. Returns what leaves nothing to be written, or empty; `unsampled` is what is wrong
+/// with the draws alone.
+std::string FindExtras(const FitParts& parts, const VarianceComponents& components,
+                       Prepared* prepared, FitResult* result, Extras* extras,
+                       std::string* unsampled) {
+  const bool estimated = result->estimate.size() > 0;
+  if (estimated && prepared->sampling) {
+    *unsampled = Sample(*prepared, parts, result, &extras->posterior);
+  }
+  if (estimated) PrintResult(*prepared, *result, components);
+  if (extras->posterior) {
+    std::cout << DescribePosterior(prepared->problem->entries(), *extras->posterior);
+  }
+  if (FLAGS_discretisation_check && result->status == FitStatus::kConverged) {
+    extras->check = CheckStep(*prepared, *result);
+    std::string error = Mismatch(prepared->checkpoint.get());
+    if (!error.empty()) return error;
+    PrintCheck(prepared->problem->entries(), *extras->check);
+  }
+  if (!estimated) return "";
+  if (!prepared->held_back.empty()) {
+    extras->later = PredictLater(prepared->fit.input, *prepared->problem, result->estimate,
+                                 FLAGS_predict_from, std::move(prepared->held_back));
+    PrintScore(extras->later->score);
+  }
+  PredictHeld(*result, components, prepared, &extras->held_out);
+  AskWhatIsMissing(*prepared, *result, &extras->missing);
+  const std::string error = PlanNext(*prepared, *result, &extras->design);
+  return error.empty() ? "" : prepared->fit.path + ": --design: " + error;
+}
+
 int Run(const std::string& text, const std::string& file, const ShardPlan& plan) {
   Prepared prepared;
   const int status = Prepare(text, file, &prepared);
@@ -567,52 +615,17 @@ int Run(const std::string& text, const std::string& file, const ShardPlan& plan)
       FitWithComponents(options, prepared.problem.get(), progress, &components, next_log);
   ScaleObservations(components.noise, &prepared);
   error = Mismatch(checkpoint);
-  if (!error.empty()) {
-    return ReportError(error);
-  }
-  FitFindings findings{&components};
-  const bool estimated = result.estimate.size() > 0;
-  std::optional<Posterior> posterior;
+  if (!error.empty()) return ReportError(error);
+  Extras extras;
   std::string unsampled;
-  if (estimated && prepared.sampling) unsampled = Sample(prepared, parts, &result, &posterior);
-  if (estimated) {
-    PrintResult(prepared, result, components);
-  }
-  if (posterior) {
-    findings.posterior = &*posterior;
-    std::cout << DescribePosterior(prepared.problem->entries(), *posterior);
-  }
-  std::optional<DiscretisationCheck> check;
-  if (FLAGS_discretisation_check && result.status == FitStatus::kConverged) {
-    findings.check = &check.emplace(CheckStep(prepared, result));
-    error = Mismatch(checkpoint);
-    if (!error.empty()) {
-      return ReportError(error);
-    }
-    PrintCheck(prepared.problem->entries(), *check);
-  }
-  std::optional<PredictedRecordings> later;
-  if (!prepared.held_back.empty() && estimated) {
-    findings.later =
-        &later.emplace(PredictLater(prepared.fit.input, *prepared.problem, result.estimate,
-                                    FLAGS_predict_from, std::move(prepared.held_back)));
-    PrintScore(later->score);
-  }
-  std::optional<HeldOutRuns> held_out;
-  if (estimated) PredictHeld(result, components, &prepared, &held_out);
-  findings.held_out = held_out ? &*held_out : nullptr;
-  std::optional<MissingResult> missing;
-  if (estimated) AskWhatIsMissing(prepared, result, &missing);
-  findings.missing = missing ? &*missing : nullptr;
-  std::optional<Design> design;
-  if (estimated) error = PlanNext(prepared, result, &design);
-  if (!error.empty()) return ReportError(file + ": --design: " + error);
-  findings.design = design ? &*design : nullptr;
+  error = FindExtras(parts, components, &prepared, &result, &extras, &unsampled);
+  if (!error.empty()) return ReportError(error);
   if (checkpoint != nullptr && !checkpoint->error().empty()) {
     ReportError(checkpoint->error() + ": the fit went on without its checkpoint");
   }
   std::optional<MotionCheck> motion;
-  if (FLAGS_compare_motion && estimated) motion = CompareMotion(prepared, result);
+  if (FLAGS_compare_motion && result.estimate.size() > 0) motion = CompareMotion(prepared, result);
+  const FitFindings findings = extras.View(components);
   error = WriteFiles(prepared, result, findings, motion ? &*motion : nullptr);
   if (error.empty() && motion && !motion->message.empty()) {
     error = file + ": --compare_motion: by events: " + motion->message;
