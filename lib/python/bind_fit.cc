@@ -32,6 +32,15 @@
 namespace tangible::python {
 namespace {
 
+// Draws, chains, warm-up, target, seed and temperatures, as the package gives them.
+using Sampling = std::tuple<int, int, int, double, unsigned, int>;
+PosteriorOptions ReadSampling(const Sampling& sampling) {
+  const auto& [draws, chains, warm_up, target, seed, temperatures] = sampling;
+  PosteriorOptions options{draws, chains, warm_up, target, seed};
+  options.temperatures = temperatures;
+  return options;
+}
+
 // A fit file of one run or several recordings, read. Calls change its memory, and take turns.
 class FitProblemOf {
  public:
@@ -78,10 +87,12 @@ class FitProblemOf {
         with_jacobian ? py::object(ToArray(jacobian, {rows, count})) : py::object(py::none()));
   }
 
-  // What others have done of a fit, as texts: starts in their order, and profiles of these names.
+  // What others have done of a fit, as texts: starts in their order, profiles of these names, and
+  // chains in their order.
   struct Parts {
     std::vector<std::string> starts;
     std::vector<std::string> names, profiles;
+    std::vector<std::string> chains;
   };
   struct Wanted {
     int max_iterations = 50;
@@ -119,8 +130,34 @@ class FitProblemOf {
         SetProfiles({name});
         HoldBack(predict_from);
         const auto made = MakeProfiles(fit_.input.options(), problem_.get(),
-                                       Read({starts, {}, {}}).starts, {name});
+                                       Read({starts, {}, {}, {}}).starts, {name});
         return made.empty() ? std::string() : ToRow(made.begin()->second).dump();
+      });
+    });
+  }
+
+  // A chain of draws from the posterior around that estimate, likewise.
+  std::string MakeChain(int number, int max_iterations, double predict_from, int threads,
+                        const std::vector<std::string>& starts, const Sampling& sampling) {
+    return WithoutLock([&] {
+      return turns_.Take([&] {
+        SetOptions(max_iterations, threads);
+        std::vector<std::vector<Observation>> held_back = HoldBack(predict_from);
+        FitParts parts = Read({starts, {}, {}, {}});
+        FitPartLogs logs(&parts);
+        const FitOptions& options = fit_.input.options();
+        VarianceComponents components;
+        const FitResult result = FitWithComponents(options, problem_.get(), {}, &components,
+                                                   [&logs] { return logs.Next(); });
+        Scale(components.noise, &held_back);
+        std::vector<FinishedChain> chains;
+        std::string error;
+        if (result.estimate.size() > 0) {
+          MakeChains(ReadSampling(sampling), options, result,
+                     FreeCoordinates(problem_->entries(), problem_->effects()),
+                     MakerOf(fit_.input, *problem_), {number}, &chains, &error);
+        }
+        return chains.empty() ? std::string() : ToRow(chains.front()).dump();
       });
     });
   }
@@ -170,7 +207,7 @@ class FitProblemOf {
     Scale(components.noise, &held_back);
     CheckSameFit(checkpoint.get());
     FitFindings findings{&components};
-    const std::optional<Posterior> posterior = Sample(wanted, &result);
+    const std::optional<Posterior> posterior = Sample(wanted, parts, &result);
     if (posterior) findings.posterior = &*posterior;
     std::optional<DiscretisationCheck> check;
     if (wanted.discretisation_check && result.status == FitStatus::kConverged) {
@@ -216,13 +253,13 @@ class FitProblemOf {
   }
 
   // Draws around the estimate, whose intervals become those of the result.
-  std::optional<Posterior> Sample(const Wanted& wanted, FitResult* result) {
+  std::optional<Posterior> Sample(const Wanted& wanted, const FitParts& parts, FitResult* result) {
     if (!wanted.sampling || result->estimate.size() == 0) return std::nullopt;
     std::optional<Posterior> made(std::in_place);
     std::string error;
     if (!SamplePosterior(*wanted.sampling, fit_.input.options(), *result,
                          FreeCoordinates(problem_->entries(), problem_->effects()),
-                         MakerOf(fit_.input, *problem_), nullptr, {}, &*made, &error)) {
+                         MakerOf(fit_.input, *problem_), nullptr, parts.chains, &*made, &error)) {
       throw Error("posterior: " + error);
     }
     TakeIntervals(*made, result);
@@ -276,6 +313,10 @@ class FitProblemOf {
     for (size_t i = 0; i < texts.profiles.size(); ++i) {
       if (texts.profiles[i].empty()) continue;
       FromRow(Json::parse(texts.profiles[i]), &parts.profiles[texts.names.at(i)]);
+    }
+    for (size_t i = 0; i < texts.chains.size(); ++i) {
+      if (texts.chains[i].empty()) continue;
+      FromRow(Json::parse(texts.chains[i]), &parts.chains[static_cast<int>(i)]);
     }
     return parts;
   }
@@ -395,6 +436,7 @@ void BindFit(py::module_* module) {
       .def_property_readonly("num_starts", &FitProblemOf::num_starts)
       .def("start", &FitProblemOf::MakeStart)
       .def("profile", &FitProblemOf::MakeProfile)
+      .def("chain", &FitProblemOf::MakeChain)
       .def("ranges", &FitProblemOf::Ranges)
       .def("evaluate", &FitProblemOf::Evaluate)
       .def("run",
@@ -402,14 +444,10 @@ void BindFit(py::module_* module) {
               const std::string& checkpoint, const py::object& on_iteration,
               const std::vector<std::string>& profiles, const std::vector<std::string>& starts_done,
               const std::vector<std::string>& profiles_done, const std::string& design,
-              const std::string& design_name, bool missing,
-              const std::optional<std::tuple<int, int, int, double, unsigned, int>>& sampling) {
+              const std::string& design_name, bool missing, const std::optional<Sampling>& sampling,
+              const std::vector<std::string>& chains_done) {
              std::optional<PosteriorOptions> options;
-             if (sampling) {
-               const auto& [draws, chains, warm_up, target, seed, temperatures] = *sampling;
-               options = {draws, chains, warm_up, target, seed};
-               options->temperatures = temperatures;
-             }
+             if (sampling) options = ReadSampling(*sampling);
              return fit.Run({max_iterations,
                              predict_from,
                              discretisation_check,
@@ -418,7 +456,7 @@ void BindFit(py::module_* module) {
                              profiles,
                              design,
                              design_name,
-                             {starts_done, profiles, profiles_done},
+                             {starts_done, profiles, profiles_done, chains_done},
                              missing,
                              options});
            });

@@ -122,6 +122,7 @@ def fitted(**more: Any) -> tuple[tangible.FitResult, list[Any]]:
         {"profile": ["restitution", "speed"]},
         {"starts": 3, "profile": ["speed"], "predict_from": 0.5},
         {"profile": ["speed"], "loss": {"huber": 2}},
+        {"starts": 2, "posterior": 40, "posterior_chains": 3, "posterior_warm_up": 30, "posterior_seed": 5},
     ],
 )
 def test_fits_have_the_same_bits(executor: Executor, how: dict[str, Any]) -> None:
@@ -132,6 +133,8 @@ def test_fits_have_the_same_bits(executor: Executor, how: dict[str, Any]) -> Non
     assert told_by_others == told and len(told) > how.get("starts", 1)
     assert len(shared.data["starts"]) >= how.get("starts", 1)
     assert len(shared.data.get("profiles") or []) >= len(how.get("profile", []))
+    assert list(shared.draws) == list(alone.draws) and bool(shared.draws) == ("posterior" in how)
+    assert all(np.array_equal(shared.draws[name], alone.draws[name]) for name in alone.draws)
     assert shared.scene.to_json() == alone.scene.to_json()
 
 
@@ -149,6 +152,10 @@ def test_fits_send_starts_and_profiles() -> None:
         sent.clear()
         fitted(executor=pool)
         assert not sent
+        fitted(posterior=9, posterior_chains=3, posterior_warm_up=5, executor=pool)
+        assert [(arguments[0].__name__, arguments[2]) for arguments in sent] == [
+            ("_start", 0), ("_chain", 0), ("_chain", 1), ("_chain", 2)
+        ]
         with pytest.raises(tangible.TangibleError, match="profile: expected names"):
             fitted(profile=["mass"], executor=pool)
         with pytest.raises(ValueError, match="checkpoint: not with executor"):

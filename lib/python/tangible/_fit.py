@@ -12,7 +12,7 @@ import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Union
+from typing import TYPE_CHECKING, Any, Tuple, Union
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -414,9 +414,13 @@ def _read_draws(text: str) -> dict[str, Floats]:
     return {name: np.array([float(cell) for cell in cells]) for name, cells in zip(header, zip(*rows))}
 
 
+# Draws, chains, warm-up, target, seed and temperatures, as the core takes them.
+Sampling = Tuple[int, int, int, float, int, int]
+
+
 def _sampling(
     draws: int | None, chains: int, warm_up: int, target: float, seed: int, temperatures: int
-) -> tuple[int, int, int, float, int, int] | None:
+) -> Sampling | None:
     """The options of draws from the posterior, as the core takes them."""
     if draws is None:
         return None
@@ -446,25 +450,40 @@ def _profile(
         return core.profile(name, max_iterations, predict_from, 1, starts)
 
 
+def _chain(
+    problem: Problem, number: int, max_iterations: int, predict_from: float, starts: list[str],
+    sampling: Sampling,
+) -> str:
+    """A chain of draws around the estimate of a fit with these starts, in a worker's process."""
+    with problem.read() as core:
+        return core.chain(number, max_iterations, predict_from, 1, starts, sampling)
+
+
 def _parts(
     executor: Executor | None, problem: Problem, max_iterations: int, predict_from: float,
-    profiles: list[str],
-) -> tuple[list[str], list[str]]:
-    """Starts and profiles that the executor's workers have made: what a fit takes over."""
+    profiles: list[str], sampling: Sampling | None,
+) -> tuple[list[str], list[str], list[str]]:
+    """Starts, profiles and chains that the executor's workers have made: what a fit takes over."""
     if executor is None:
-        return [], []
+        return [], [], []
     with problem.read() as core:
         count, known = core.num_starts, core.names
     for name in profiles:
         if name not in known:
             raise _core.TangibleError(f"profile: expected names of parameters, got {name}")
     starts: list[str] = []
-    # The one start of a fit is worth sending where profiles begin from it.
-    if count > 1 or profiles:
+    # The one start of a fit is worth sending where profiles or chains begin from it.
+    if count > 1 or profiles or sampling is not None:
         calls = [(problem, number, max_iterations, predict_from) for number in range(count)]
         starts = _executor.in_order(executor, _start, calls)
     around = [(problem, name, max_iterations, predict_from, starts) for name in profiles]
-    return starts, _executor.in_order(executor, _profile, around)
+    made = _executor.in_order(executor, _profile, around)
+    if sampling is None:
+        return starts, made, []
+    chains = [
+        (problem, number, max_iterations, predict_from, starts, sampling) for number in range(sampling[1])
+    ]
+    return starts, made, _executor.in_order(executor, _chain, chains)
 
 
 def _progress(said: dict[str, Any]) -> None:
@@ -551,8 +570,8 @@ def fit(
         progress: Whether a line on stderr says how far it is.
         on_failure: "raise", or "return" a result that has not converged.
         executor: One of `concurrent.futures` whose workers, on this machine or others, make the
-            starts (`starts` of the fit) and the profiles that are asked for, one thread each; the
-            bits are those without. Not with `checkpoint`.
+            starts (`starts` of the fit), the profiles that are asked for and the chains of
+            `posterior`, one thread each; the bits are those without. Not with `checkpoint`.
         **keys: With `data`, further keys of a fit file: `loss`, `starts`, `seed`, `sensors`, ...
 
     Raises:
@@ -592,7 +611,9 @@ def fit(
     elif design is not None:
         candidates = (text_of(os.fspath(design)), os.fspath(design))
     try:
-        starts_done, profiles_done = _parts(executor, made, max_iterations, end, profiles)
+        starts_done, profiles_done, chains_done = _parts(
+            executor, made, max_iterations, end, profiles, sampling
+        )
         with made.read() as core:
             text, page, predictions, scenes, draws = core.run(
                 max_iterations,
@@ -606,6 +627,7 @@ def fit(
                 *candidates,
                 missing,
                 sampling,
+                chains_done,
             )
     finally:
         if progress:
