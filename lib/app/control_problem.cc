@@ -235,21 +235,24 @@ class Reader {
 
   // A point's two coordinates are two terms.
   void ReadPoint(const JsonReader& json, CostTerm term) {
-    const JsonReader point = json.At("point");
-    point.ExpectKeys({"body", "at"}, " of a point");
-    std::vector<std::string> bodies;
-    for (size_t i = 0; i < outputs_.size(); i += 6) {
-      bodies.push_back(outputs_[i].substr(0, outputs_[i].size() - 2));
-    }
-    term.kind = CostTerm::Kind::kPoint;
-    term.index = 6 * IndexOf(point.At("body"), bodies, "a moving body");
-    if (point.Has("at")) term.at = point.At("at").Point();
+    PlacePoint(json.At("point"), &term);
     const Vector2<double> target = json.At("target").Point();
     for (int axis = 0; axis < 2; ++axis) {
       term.axis = axis;
       term.target = target[axis];
       problem_.terms.push_back(term);
     }
+  }
+
+  void PlacePoint(const JsonReader& point, CostTerm* term) const {
+    point.ExpectKeys({"body", "at"}, " of a point");
+    std::vector<std::string> bodies;
+    for (size_t i = 0; i < outputs_.size(); i += 6) {
+      bodies.push_back(outputs_[i].substr(0, outputs_[i].size() - 2));
+    }
+    term->kind = CostTerm::Kind::kPoint;
+    term->index = 6 * IndexOf(point.At("body"), bodies, "a moving body");
+    if (point.Has("at")) term->at = point.At("at").Point();
   }
 
   // True, false or "secants".
@@ -321,12 +324,51 @@ class Reader {
   }
 
   void ReadPredictive(const JsonReader& json) {
-    json.ExpectKeys({"duration", "horizon", "iterations"}, " of mpc");
+    json.ExpectKeys({"duration", "horizon", "iterations", "observations"}, " of mpc");
     const double dt = problem_.scene.simulation.dt;
     problem_.run_duration = ReadSpan(json.At("duration"), dt);
     problem_.plan_horizon = ReadSpan(json.At("horizon"), dt);
     if (json.Has("iterations")) {
       problem_.plan_iterations = json.At("iterations").Integer(1, 1000000);
+    }
+    if (json.Has("observations")) ReadObservations(json.At("observations"));
+  }
+
+  void ReadObservations(const JsonReader& json) {
+    json.ExpectKeys({"sensors", "every", "seed", "initial_sigma", "acceleration_sigma"},
+                    " of observations");
+    FilterOptions& filter = problem_.filter;
+    const JsonReader sensors = json.At("sensors");
+    const int count = sensors.ExpectArray("an array of sensors");
+    if (count == 0) sensors.Fail("expected at least one sensor, got none");
+    std::vector<double> sigma;
+    for (int i = 0; i < count && root_.ok(); ++i) {
+      const JsonReader sensor = sensors.At(i);
+      sensor.ExpectKeys({"state", "point", "sigma"}, " of a sensor");
+      if (sensor.Has("state") == sensor.Has("point")) {
+        sensor.Fail(std::string("expected one of state and point, got ") +
+                    (sensor.Has("state") ? "both" : "neither"));
+        return;
+      }
+      CostTerm term;
+      if (sensor.Has("state")) {
+        term.index = IndexOf(sensor.At("state"), outputs_, "a number of the state");
+      } else {
+        PlacePoint(sensor.At("point"), &term);
+      }
+      const double noise = sensor.At("sigma").Number(NumberKind::kPositive);
+      for (term.axis = 0; term.axis < (sensor.Has("point") ? 2 : 1); ++term.axis) {
+        filter.sensors.push_back(term);
+        sigma.push_back(noise);
+      }
+    }
+    filter.sigma =
+        Eigen::Map<const VectorX<double>>(sigma.data(), static_cast<Eigen::Index>(sigma.size()));
+    if (json.Has("every")) problem_.observe_every = json.At("every").Integer(1, 1000000);
+    ReadSeed(json, &problem_.noise_seed);
+    for (const auto& [key, value] : {std::pair("initial_sigma", &filter.initial_sigma),
+                                     {"acceleration_sigma", &filter.acceleration_sigma}}) {
+      if (json.Has(key)) *value = json.At(key).Number(NumberKind::kNonNegative);
     }
   }
 

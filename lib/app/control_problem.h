@@ -9,6 +9,7 @@
 #include "tangible/control/engine_step.h"
 #include "tangible/control/ilqr.h"
 #include "tangible/control/plan_search.h"
+#include "tangible/control/state_filter.h"
 
 namespace tangible {
 
@@ -28,6 +29,10 @@ struct ControlFile {
   double run_duration = 0.0;
   double plan_horizon = 0.0;
   int plan_iterations = 5;
+  /// What the plans are made from; without sensors the plant's state itself.
+  FilterOptions filter;
+  int observe_every = 1;  ///< steps from one observation to the next
+  unsigned noise_seed = 0;
 
   /// The initial controls of so many steps; a table that ends before holds its last row.
   RowMatrixXd InitialControls(long steps) const;

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <ctime>
+#include <optional>
+#include <random>
 #include <utility>
 
 #include "tangible/app/certificate_json.h"
@@ -13,6 +15,7 @@
 #include "tangible/control/plan_search.h"
 #include "tangible/control/unreached_targets.h"
 #include "tangible/math/median.h"
+#include "tangible/math/random.h"
 #include "tangible/render/html.h"
 #include "tangible/scene/scene_names.h"
 
@@ -311,11 +314,17 @@ struct PredictiveRun {
   // States of the plant that are not on the model's joints, and the largest error of one, m or rad.
   long projected = 0;
   double joint_error = 0.0;
+  // Of estimates from observations: the sum of what surprises, how often, and of each number of the
+  // state the sum of squares of what it is off.
+  double surprise = 0.0;
+  long observations = 0;
+  VectorX<double> squared_errors;
   std::string failure;        // of the first plan that failed: where and why
   bool left_maximum = false;  // in any plan
   // The first contact in a plan by fixed steps through which its derivatives are not the motion's.
   std::string discrete_map;
-  std::string error;
+  std::string error;         // of the plant
+  std::string filter_error;  // of the model, which cannot make a step from an estimate
 };
 
 long NumRunSteps(const ControlFile& file) {
@@ -336,6 +345,53 @@ RowMatrixXd FirstControls(const ControlFile& file, const Cost& cost, long horizo
   return best.status == IlqrStatus::kFailed ? initial : best.plan.controls;
 }
 
+// What a plan is made from: the plant's state, on the joints of the model, or an estimate of it.
+class Sight {
+ public:
+  Sight(const ControlFile& file, EngineStep* map)
+      : file_(file), map_(*map), random_(Generator(file.noise_seed, 0)) {
+    if (file.filter.sensors.empty()) return;
+    filter_.emplace(map, file.scene.simulation.dt, file.filter);
+  }
+
+  VectorX<double> See(long k, const VectorX<double>& x, PredictiveRun* run) {
+    if (filter_) return Estimate(k, x, run);
+    VectorX<double> seen = x;
+    double error = 0.0;
+    if (map_.ProjectOntoJoints(k, &seen, &error) != JointState::Outcome::kOnJoints) {
+      ++run->projected;
+      run->joint_error = std::max(run->joint_error, error);
+    }
+    return seen;
+  }
+
+  // The control that acts in the step.
+  bool Play(long k, const VectorX<double>& u, std::string* error) {
+    return !filter_ || filter_->Advance(k, u, error);
+  }
+
+ private:
+  VectorX<double> Estimate(long k, const VectorX<double>& x, PredictiveRun* run) {
+    if (k % file_.observe_every == 0) {
+      VectorX<double> observed = filter_->Read(x);
+      for (Eigen::Index i = 0; i < observed.size(); ++i) {
+        observed[i] += file_.filter.sigma[i] * Normal(&random_);
+      }
+      filter_->Correct(k, observed);
+      run->surprise += filter_->surprise() / static_cast<double>(observed.size());
+      ++run->observations;
+    }
+    if (run->squared_errors.size() == 0) run->squared_errors.setZero(x.size());
+    run->squared_errors += (filter_->state() - x).cwiseAbs2();
+    return filter_->state();
+  }
+
+  const ControlFile& file_;
+  EngineStep& map_;
+  std::optional<StateFilter> filter_;
+  std::mt19937_64 random_;
+};
+
 PredictiveRun Control(const ControlFile& file, const ControlRunOptions& wanted, EngineStep* map,
                       EngineStep* plant) {
   PredictiveRun run;
@@ -348,6 +404,7 @@ PredictiveRun Control(const ControlFile& file, const ControlRunOptions& wanted, 
   if (wanted.budget > 0.0) options.ilqr.max_iterations = file.options.max_iterations;
   PredictiveController controller({map, &cost, map->initial(), file.low, file.high, 0},
                                   FirstControls(file, cost, horizon, wanted.threads), options);
+  Sight sight(file, map);
   VectorX<double> x = plant->initial();
   run.states.resize(steps + 1, x.size());
   run.controls.resize(steps, map->num_controls());
@@ -355,13 +412,7 @@ PredictiveRun Control(const ControlFile& file, const ControlRunOptions& wanted, 
   VectorX<double> next;
   for (long k = 0; k < steps; ++k) {
     const std::clock_t began = std::clock();
-    VectorX<double> seen = x;
-    double error = 0.0;
-    if (map->ProjectOntoJoints(k, &seen, &error) != JointState::Outcome::kOnJoints) {
-      ++run.projected;
-      run.joint_error = std::max(run.joint_error, error);
-    }
-    const VectorX<double> u = controller.Control(k, seen);
+    const VectorX<double> u = controller.Control(k, sight.See(k, x, &run));
     run.seconds.push_back(static_cast<double>(std::clock() - began) / CLOCKS_PER_SEC);
     run.left_maximum |= controller.last().left_maximum;
     if (controller.last().status == IlqrStatus::kFailed && run.failed++ == 0) {
@@ -372,6 +423,7 @@ PredictiveRun Control(const ControlFile& file, const ControlRunOptions& wanted, 
       run.discrete_map = map->DiscreteMapOf(k, plan.states, plan.controls);
     }
     if (!plant->Step(k, x, u, &next, &run.error)) return run;
+    if (k + 1 < steps && !sight.Play(k, u, &run.filter_error)) return run;
     run.cost += cost.Value(x, u);
     run.controls.row(k) = u.transpose();
     run.states.row(k + 1) = next.transpose();
@@ -399,6 +451,10 @@ std::string FailedPlans(const PredictiveRun& run) {
 std::string WhyNoResult(const PredictiveRun& run, const std::string& name,
                         const std::string& plant_name) {
   if (!run.error.empty()) return plant_name + ": " + run.error;
+  if (!run.filter_error.empty()) {
+    return name +
+           ": /mpc/observations: no step of the model from the estimate: " + run.filter_error;
+  }
   if (run.failed == static_cast<long>(run.seconds.size())) {
     return name + ": " + FailedPlans(run) + ", the first " + run.failure;
   }
@@ -462,6 +518,18 @@ std::string RunPredictive(const std::string& name, const ControlFile& file, cons
                  {"cpu_seconds_median", UpperMedian(made.seconds)},
                  {"cpu_seconds_max", *std::max_element(made.seconds.begin(), made.seconds.end())},
                  {"controls", DescribeControls(file, made.controls, file.scene.simulation.dt)}};
+  if (made.observations > 0) {
+    OrderedJson errors = OrderedJson::object();
+    const std::vector<std::string> names = OutputNames(function.structure());
+    for (size_t i = 0; i < names.size(); ++i) {
+      errors[names[i]] = std::sqrt(made.squared_errors[static_cast<Eigen::Index>(i)] /
+                                   static_cast<double>(made.controls.rows()));
+    }
+    run->result["estimates"] = {
+        {"observations", made.observations},
+        {"surprise_mean", made.surprise / static_cast<double>(made.observations)},
+        {"error_rms", std::move(errors)}};
+  }
   run->verdict.status = "done";
   run->scene = plant;
   run->scene.simulation.duration = static_cast<double>(made.controls.rows()) * plant.simulation.dt;

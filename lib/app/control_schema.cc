@@ -30,6 +30,21 @@ OrderedJson TermSchema() {
   return schema;
 }
 
+OrderedJson ObservationsSchema() {
+  OrderedJson sensor = SchemaOfObject(
+      {{"state", SchemaOfText()},
+       {"point", SchemaOfObject({{"body", SchemaOfName()}, {"at", SchemaOfPoint("m")}}, {"body"})},
+       {"sigma", SchemaOfNumber(NumberKind::kPositive)}},
+      {"sigma"});
+  sensor["oneOf"] = OrderedJson::array({{{"required", {"state"}}}, {{"required", {"point"}}}});
+  return SchemaOfObject({{"sensors", SchemaOfArray(sensor, 1)},
+                         {"every", SchemaOfInteger(1, kMost)},
+                         {"seed", SchemaOfInteger(0, 1000000000)},
+                         {"initial_sigma", SchemaOfNumber(NumberKind::kNonNegative)},
+                         {"acceleration_sigma", SchemaOfNumber(NumberKind::kNonNegative)}},
+                        {"sensors"});
+}
+
 }  // namespace
 
 OrderedJson ControlSchema() {
@@ -65,7 +80,8 @@ OrderedJson ControlSchema() {
            {"initial", SchemaOfObject({{"file", SchemaOfText()}}, {"file"})},
            {"mpc", SchemaOfObject({{"duration", seconds},
                                    {"horizon", seconds},
-                                   {"iterations", SchemaOfInteger(1, kMost)}},
+                                   {"iterations", SchemaOfInteger(1, kMost)},
+                                   {"observations", ObservationsSchema()}},
                                   {"duration", "horizon"})}},
           {"scene", "controls", "cost"}));
 }

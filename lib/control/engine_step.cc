@@ -191,6 +191,20 @@ JointState::Outcome EngineStep::ProjectOntoJoints(long k, VectorX<double>* x, do
   return outcome;
 }
 
+MatrixX<double> EngineStep::JointProjector(long k, const VectorX<double>& x) const {
+  const MatrixX<double> of_twists = joints_.Projector(StateOf(k, x));
+  MatrixX<double> projector = MatrixX<double>::Zero(x.size(), x.size());
+  // Of each body the pose, then the twist.
+  for (Eigen::Index i = 0; i < of_twists.rows(); i += 3) {
+    for (Eigen::Index j = 0; j < of_twists.cols(); j += 3) {
+      const auto block = of_twists.block<3, 3>(i, j);
+      projector.block<3, 3>(2 * i, 2 * j) = block;
+      projector.block<3, 3>(2 * i + 3, 2 * j + 3) = block;
+    }
+  }
+  return projector;
+}
+
 std::string EngineStep::DiscreteMapOf(long first, const RowMatrixXd& states,
                                       const RowMatrixXd& controls) {
   const ModelStructure& s = *model_.structure;

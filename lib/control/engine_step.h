@@ -48,10 +48,14 @@ class EngineStep : public StepMap {
   /// `error`: the joints' largest before, m or rad. One that cannot be moved there stays.
   JointState::Outcome ProjectOntoJoints(long k, VectorX<double>* x, double* error);
 
+  /// To where changes of the state are projected there, to first order and with the joints' rows at
+  /// x: num_states x num_states.
+  MatrixX<double> JointProjector(long k, const VectorX<double>& x) const;
+
   /// Fixed steps from step `first` on, a row of `controls` each, from the states at their starts:
-  /// the first contact that is made or broken, or impact with restitution, through which their
-  /// derivatives are not the motion's (certificate/discrete_map.h). Empty where there is none, and
-  /// with event stepping.
+  /// the first contact that is made or broken, impact with restitution or slip that turns back,
+  /// through which their derivatives are not the motion's (certificate/discrete_map.h). Empty where
+  /// there is none, and with event stepping.
   std::string DiscreteMapOf(long first, const RowMatrixXd& states, const RowMatrixXd& controls);
 
   /// The initial state of the scene.

@@ -11,6 +11,7 @@
 // bodies, and angles and rates stay as they were observed where the joints leave them free.
 
 #include "tangible/dynamics/model/model.h"
+#include "tangible/math/scalar.h"
 #include "tangible/simulation/stepping/joint_projection.h"
 
 namespace tangible {
@@ -26,10 +27,20 @@ class JointState {
   };
   Outcome Project(State<double>* state);
 
+  /// To where changes of poses or twists of moving bodies, a block each, are projected:
+  /// I − W^-½ (A W^-½)⁺ A, 3 num_moving x 3 num_moving.
+  MatrixX<double> Projector(const State<double>& state) const;
+
   /// The joints' largest error before the last projection, m or rad.
   double error() const { return error_; }
 
  private:
+  struct Rows {
+    MatrixX<double> rows;   ///< A W^-½
+    VectorX<double> rates;  ///< A v
+    VectorX<double> roots;  ///< the diagonal of W^½
+  };
+  Rows RowsAt(const State<double>& state) const;
   /// Dense: cubic in the number of rows of joints.
   void ProjectTwists(State<double>* state) const;
 

@@ -96,6 +96,59 @@ TEST_F(TangibleControlTest, RecedingHorizonsBringAHeavierPlantToTheMark) {
   EXPECT_NEAR(json::parse(timed.out)["final_state"]["cart/x"].get<double>(), 1.0, 0.05);
 }
 
+// The plant's state is not known: what a noisy sensor reads is filtered by the model.
+TEST_F(TangibleControlTest, RecedingHorizonsFromNoisyObservations) {
+  const auto problem = [](const std::string& observations) {
+    return R"({"scene": "cart.json", "controls": [)" + std::string(kEffort) + R"(], "cost": [
+      {"state": "cart/x", "target": 1, "weight": 100}, {"state": "cart/vx", "weight": 10},
+      {"control": "joints/rail/effort", "weight": 0.01}],
+      "mpc": {"duration": 3, "horizon": 1, "observations": )" +
+           observations + "}}";
+  };
+  const auto played = [&](const std::string& observations) {
+    const ProgramRun run = Control(problem(observations), "--mpc");
+    EXPECT_EQ(run.exit_status, 0) << run.error;
+    json result = json::parse(run.out);
+    for (const char* time : {"cpu_seconds_median", "cpu_seconds_max"}) result.erase(time);
+    return result;
+  };
+  const std::string sensors = R"({"sensors": [{"state": "cart/x", "sigma": 0.01}])";
+  const json result = played(sensors + "}");
+  EXPECT_EQ(result["estimates"]["observations"], 60);
+  EXPECT_NEAR(result["estimates"]["surprise_mean"].get<double>(), 1.0, 0.5);
+  const double error = result["estimates"]["error_rms"]["cart/x"].get<double>();
+  EXPECT_GT(error, 1e-4);
+  EXPECT_LT(error, 0.01);
+  EXPECT_NEAR(result["final_state"]["cart/x"].get<double>(), 1.0, 0.05);
+  EXPECT_EQ(result, played(sensors + "}"));
+  EXPECT_NE(result["cost"], played(sensors + R"(, "seed": 2})")["cost"]);
+  const json rarely = played(sensors + R"(, "every": 7, "acceleration_sigma": 0.5})");
+  EXPECT_EQ(rarely["estimates"]["observations"], 9);
+  const json point =
+      played(R"({"sensors": [{"point": {"body": "cart", "at": [0.1, 0]}, "sigma": 0.01}]})");
+  EXPECT_LT(point["estimates"]["error_rms"]["cart/x"].get<double>(), 0.01);
+
+  for (const auto& [observations, message] :
+       {std::pair(R"({})", "/mpc/observations: missing key \"sensors\""),
+        {R"({"sensors": []})", "/mpc/observations/sensors: expected at least one sensor, got none"},
+        {R"({"sensors": [{"sigma": 1}]})",
+         "/mpc/observations/sensors/0: expected one of state and point, got neither"},
+        {R"({"sensors": [{"state": "cart/x", "point": {"body": "cart"}, "sigma": 1}]})",
+         "got both"},
+        {R"({"sensors": [{"state": "cart/z", "sigma": 1}]})",
+         "/mpc/observations/sensors/0/state: expected a number of the state"},
+        {R"({"sensors": [{"state": "cart/x", "sigma": 0}]})",
+         "/mpc/observations/sensors/0/sigma: expected"},
+        {R"({"sensors": [{"state": "cart/x"}]})", "/mpc/observations/sensors/0: missing"},
+        {R"({"sensors": [{"state": "cart/x", "sigma": 1}], "every": 0})",
+         "/mpc/observations/every: expected"},
+        {R"({"sensors": [{"state": "cart/x", "sigma": 1}], "initial_sigma": -1})",
+         "/mpc/observations/initial_sigma: expected"},
+        {R"({"sensors": [{"state": "cart/x", "sigma": 1}], "noise": 1})", "/mpc/observations"}}) {
+    ExpectOneLine(Control(problem(observations), "--mpc"), 1, message);
+  }
+}
+
 // A pole that is 20 % longer in the plant: its states are not on the model's joints, and by events
 // no step could be made from them. They are projected, which the result counts, and it stands.
 TEST_F(TangibleControlTest, StatesOfALongerPoleAreProjectedOntoTheModelsJoints) {

@@ -233,6 +233,8 @@ class MpcResult(_Controlled):
         states_projected: States of the plant that were not on the joints of the model.
         joint_error_max: The largest error of one, m or rad.
         seconds_median, seconds_max: CPU time of a plan.
+        estimates: Of a problem with `observations`: their number, how far each number of the state
+            was estimated off (`error_rms`) and how much surprised; None where plans know the state.
         certificate: Of the model's run with the controls that were played.
         warnings: What `tangible-control` warns of.
         scene: The plant, for the time of the run.
@@ -248,6 +250,7 @@ class MpcResult(_Controlled):
         self.joint_error_max = float(data["joint_error_max"])
         self.seconds_median = float(data["cpu_seconds_median"])
         self.seconds_max = float(data["cpu_seconds_max"])
+        self.estimates: dict[str, Any] | None = data.get("estimates")
 
     def __repr__(self) -> str:
         return (

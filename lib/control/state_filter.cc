@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/control/state_filter.h"
+
+#include <utility>
+
+#include "tangible/math/decompositions.h"
+
+namespace tangible {
+
+StateFilter::StateFilter(EngineStep* model, double dt, FilterOptions options)
+    : model_(model), options_(std::move(options)), x_(model->initial()) {
+  const Eigen::Index n = x_.size();
+  const double initial = options_.initial_sigma, speed = options_.acceleration_sigma * dt;
+  const MatrixX<double> onto_joints = model->JointProjector(0, x_);
+  covariance_ = initial * initial * onto_joints * onto_joints.transpose();
+  drift_.setZero(n);
+  // Of a body: x, y, angle, and their speeds.
+  for (Eigen::Index i = 0; i < n; ++i) drift_[i] = i % 6 < 3 ? 0.0 : speed * speed;
+}
+
+VectorX<double> StateFilter::Read(const VectorX<double>& x) const {
+  VectorX<double> read(static_cast<Eigen::Index>(options_.sensors.size()));
+  for (Eigen::Index i = 0; i < read.size(); ++i) {
+    CostTerm sensor = options_.sensors[static_cast<size_t>(i)];
+    sensor.target = 0.0;
+    read[i] = ResidualOf(sensor, x, {});
+  }
+  return read;
+}
+
+void StateFilter::Correct(long k, const VectorX<double>& observed) {
+  const Eigen::Index n = x_.size(), m = observed.size();
+  const MatrixX<double> identity = MatrixX<double>::Identity(n, n);
+  MatrixX<double> h(m, n);
+  for (Eigen::Index i = 0; i < m; ++i) {
+    h.row(i) = ChangesOf(options_.sensors[static_cast<size_t>(i)], x_, identity).transpose();
+  }
+  const MatrixX<double> spread = covariance_ * h.transpose();
+  MatrixX<double> s = h * spread;
+  s.diagonal() += options_.sigma.cwiseAbs2();
+  const Cholesky factor(s);
+  const VectorX<double> difference = observed - Read(x_);
+  const VectorX<double> weighted = factor.Solve(difference);
+  surprise_ = difference.dot(weighted);
+  x_ += spread * weighted;
+  // Joseph's form, which stays positive semidefinite whatever rounding does.
+  const MatrixX<double> gain = factor.Solve(MatrixX<double>(spread.transpose())).transpose();
+  const MatrixX<double> kept = identity - gain * h;
+  covariance_ = kept * covariance_ * kept.transpose() +
+                gain * options_.sigma.cwiseAbs2().asDiagonal() * gain.transpose();
+  // The correction goes along the joints, and to second order off them. Twists stay: those behind a
+  // fixed step are on the joints of the poses before it, and the next step brings them along.
+  const VectorX<double> corrected = x_;
+  double error = 0.0;
+  model_->ProjectOntoJoints(k, &x_, &error);
+  for (Eigen::Index i = 3; i < n; i += 6) x_.segment<3>(i) = corrected.segment<3>(i);
+}
+
+bool StateFilter::Advance(long k, const VectorX<double>& u, std::string* error) {
+  VectorX<double> next;
+  MatrixX<double> a, b;
+  if (!model_->Linearise(k, x_, u, &next, &a, &b, error)) return false;
+  covariance_.diagonal() += drift_;
+  covariance_ = a * covariance_ * a.transpose();
+  x_ = next;
+  return true;
+}
+
+}  // namespace tangible
