@@ -30,8 +30,9 @@ class Certificate(dict[str, Any]):
     """How far derivatives can be trusted: the dict that the programs write, `["verdict"]` first.
 
     In an `if` it is true where the derivatives are those of the motion and can be trusted, so not
-    where it has `discrete_map`: by fixed steps the derivatives after an impact, or a contact that is
-    made or broken, are those of the map which the steps compute. `print` shows it in words.
+    where it has `discrete_map`: by fixed steps the derivatives after an impact, a contact that is
+    made or broken, or a slip that turns back, are those of the map which the steps compute. `print`
+    shows it in words.
     """
 
     @classmethod

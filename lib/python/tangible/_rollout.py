@@ -509,8 +509,9 @@ class Rollout:
         """How far the derivatives at these inputs can be trusted.
 
         `verdict` is "trustworthy", or names a kink, a jump or a side; of a run by fixed steps in
-        which a contact was made or broken it begins with "of the discrete map: ". The initial state
-        counts as an input only where it is given. Of a batch, see `certificates`.
+        which a contact was made or broken or a slip turned back it begins with "of the discrete
+        map: ". The initial state counts as an input only where it is given. Of a batch, see
+        `certificates`.
 
         With `radius` it has how far each parameter may be changed, to first order, until another
         discrete choice is made (two more runs a parameter), and the growth of the flow.

@@ -290,6 +290,32 @@ void RolloutCertifier::AddServos(const Model<double>& model, long step, const St
   }
 }
 
+// At the length 0 the direction of a spring turns, and its force jumps by twice that of its rest
+// length, at an instant that is no event: what that adds to derivatives is missing.
+void RolloutCertifier::AddSprings(const Model<double>& model, double time,
+                                  const State<double>& before, const State<double>& after) {
+  for (const SpringIndex& spring : model.structure->springs) {
+    const double* x = &model.parameters[spring.numbers];
+    if (!spring_turns_.empty() || x[SpringIndex::kStiffness] * x[SpringIndex::kRestLength] == 0.0) {
+      continue;
+    }
+    const auto offset = [&](const State<double>& state) {
+      const Pose<double> a = state.PoseOf(spring.a), b = state.PoseOf(spring.b);
+      return Vector2<double>(a.position + a.rotation * Vector2<double>(x[0], x[1]) - b.position -
+                             b.rotation * Vector2<double>(x[2], x[3]));
+    };
+    const Vector2<double> from = offset(before), to = offset(after), way = to - from;
+    const double length = way.norm();
+    // As the ends of a straight way, with the nearest point inside or at an end.
+    const bool passes = from.dot(way) <= 0.0 && to.dot(way) >= 0.0;
+    if (!passes || !(length > 0.0)) continue;
+    const double nearest = std::abs(from.x() * way.y() - from.y() * way.x()) / length;
+    if (nearest > kNoLength * length) continue;
+    spring_turns_ = "spring " + spring.name + " has no length at t = " + Short(time) +
+                    " s or soon after, where its force turns round";
+  }
+}
+
 void RolloutCertifier::AddDiscreteMap(const Model<double>& model, long step,
                                       const StepRecord& record) {
   made_last_.clear();
@@ -318,6 +344,11 @@ void RolloutCertifier::AddStep(const Model<double>& model, long step, Stepper* s
     return;
   }
   AddDiscreteMap(model, step, at);
+  if (!model.structure->springs.empty()) {
+    State<double> after = at.before;
+    for (size_t i = 0; i < after.pose.size(); ++i) after.pose[i] += at.h * at.new_twist[i];
+    AddSprings(model, at.time, at.before, after);
+  }
   stepper->ChooseImpulses();
   const StepRecord& record = stepper->record();
   const ModelStructure& s = *model.structure;
@@ -463,6 +494,7 @@ Certificate RolloutCertifier::Finish(const Model<double>& model, const RolloutRe
         "by rounding; dt is too large";
   }
   if (certificate_.discontinuous.empty()) certificate_.discontinuous = report.energy_grown;
+  if (certificate_.discontinuous.empty()) certificate_.discontinuous = spring_turns_;
   if (coordinates_) certificate_.coordinates = coordinates_->Message(model);
   if (certificate_.discrete_impact.empty()) certificate_.discrete_impact = made_last_;
   Certificate finished = certificate_;

@@ -84,6 +84,9 @@ class RolloutCertifier {
   void AddServos(const Model<double>& model, long step, const StepRecord& record);
   void AddSupports(const Model<double>& model, long step, const StepRecord& record);
   void AddSupportsWithoutFriction(const Model<double>& model, const StepRecord& first);
+  /// Springs with a rest length whose ends pass through each other.
+  void AddSprings(const Model<double>& model, double time, const State<double>& before,
+                  const State<double>& after);
   void AddDiscreteMap(const Model<double>& model, long step, const StepRecord& record);
   void AddEventStep(const Model<double>& model, long step, Stepper* stepper);
   void AddIsland(const Model<double>& model, long step, EventDerivative* derivative,
@@ -157,6 +160,7 @@ class RolloutCertifier {
   double jump_margin_ = std::numeric_limits<double>::infinity();
   std::string jump_where_;
   std::string landing_;                ///< of the last step; empty if nothing landed in it
+  std::string spring_turns_;           ///< of the first; empty: none
   std::vector<ActiveContact> closed_;  ///< of the last step, or segment
   std::vector<ContactMode> last_modes_;
   int last_redundant_ = 0;

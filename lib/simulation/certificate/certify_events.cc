@@ -280,6 +280,7 @@ bool RolloutCertifier::SlidesAtLimit(const Model<double>& model, ContactMode by_
 void RolloutCertifier::AddSegment(const Model<double>& model, long step,
                                   EventDerivative* derivative, Segment* segment) {
   const ModelStructure& s = *model.structure;
+  AddSprings(model, segment->time, segment->before, segment->after);
   // Of the shares that redundant contacts can have of the forces, one with the fewest at a limit.
   SolvedNode& start = segment->stages[0];
   ContactSolution<double> share = start.solution;

@@ -37,12 +37,51 @@ const char* NameOf(ContactChange::Kind kind) {
       return "broken";
     case ContactChange::Kind::kRestitution:
       return "an impact with restitution";
+    case ContactChange::Kind::kReversed:
+      return "a slip that turns back";
   }
   return "";
 }
 
+// The sign of a slip at the end of the step; 0 where it rests or moves by rounding.
+double SlidesTo(const StepRecord& record, size_t i) {
+  const double sign = SlidingSign(record.solution.modes[i]);
+  if (sign == 0.0) return 0.0;
+  const ContactBlock<double>& block = record.problem.contacts[i];
+  double slip = block.c_t, terms = std::abs(block.c_t);
+  const auto add = [&](int moving, const RowPart<double>& row) {
+    if (moving < 0) return;
+    for (int k = 0; k < 3; ++k) {
+      const double term = row[k] * record.solution.motion[3 * moving + k];
+      slip += term;
+      terms += std::abs(term);
+    }
+  };
+  add(block.a, block.tangent_a);
+  add(block.b, block.tangent_b);
+  return sign * slip > kSlipRounding * terms ? sign : 0.0;
+}
+
 bool IsBefore(const ActiveContact& x, const ActiveContact& y) {
   return std::pair(x.a, x.b) < std::pair(y.a, y.b);
+}
+
+template <typename Entry>
+void Order(std::vector<Entry>* entries) {
+  std::sort(entries->begin(), entries->end(),
+            [](const Entry& x, const Entry& y) { return IsBefore(x.contact, y.contact); });
+}
+
+// The first of ordered entries between the bodies of a contact that is accepted, or null.
+template <typename Entry, typename Accept>
+Entry* Find(std::vector<Entry>* entries, const ActiveContact& contact, const Accept& accept) {
+  auto found = std::lower_bound(
+      entries->begin(), entries->end(), contact,
+      [](const Entry& entry, const ActiveContact& c) { return IsBefore(entry.contact, c); });
+  for (; found != entries->end() && !IsBefore(contact, found->contact); ++found) {
+    if (accept(*found)) return &*found;
+  }
+  return nullptr;
 }
 
 }  // namespace
@@ -53,13 +92,7 @@ std::string TextOf(const ModelStructure& structure, long step, double time,
 }
 
 DiscreteMapWatch::Touch* DiscreteMapWatch::FindLast(const ActiveContact& contact) {
-  auto found = std::lower_bound(
-      last_.begin(), last_.end(), contact,
-      [](const Touch& touch, const ActiveContact& c) { return IsBefore(touch.contact, c); });
-  for (; found != last_.end() && !IsBefore(contact, found->contact); ++found) {
-    if (found->contact.SameAs(contact)) return &*found;
-  }
-  return nullptr;
+  return Find(&last_, contact, [&](const Touch& touch) { return touch.contact.SameAs(contact); });
 }
 
 DiscreteMapWatch::Touch* DiscreteMapWatch::FindHandedOver(const Model<double>& model,
@@ -81,13 +114,9 @@ DiscreteMapWatch::Touch* DiscreteMapWatch::FindHandedOver(const Model<double>& m
 }
 
 DiscreteMapWatch::Touch* DiscreteMapWatch::FindReplaced(const ActiveContact& contact) {
-  auto found = std::lower_bound(
-      last_.begin(), last_.end(), contact,
-      [](const Touch& touch, const ActiveContact& c) { return IsBefore(touch.contact, c); });
-  for (; found != last_.end() && !IsBefore(contact, found->contact); ++found) {
-    if (!found->continues && found->contact.IsOfTheSameShapes(contact)) return &*found;
-  }
-  return nullptr;
+  return Find(&last_, contact, [&](const Touch& touch) {
+    return !touch.continues && touch.contact.IsOfTheSameShapes(contact);
+  });
 }
 
 bool DiscreteMapWatch::ExistsAtStart(const Model<double>& model, const StepRecord& record,
@@ -98,6 +127,27 @@ bool DiscreteMapWatch::ExistsAtStart(const Model<double>& model, const StepRecor
           ? lengths_.LimitTouch(record.before, model.structure->joints[contact.joint])
           : lengths_.Touch(record.before, contact.a, contact.b);
   return contact.gap <= kMeantTouches * touch && ClosesGently(model, record, i);
+}
+
+void DiscreteMapWatch::AddSlides(const StepRecord& record) {
+  slides_now_.clear();
+  for (size_t i = 0; i < record.contacts.size(); ++i) {
+    const ActiveContact& contact = record.contacts[i];
+    if (contact.IsPureFriction() || !record.problem.contacts[i].has_friction) continue;
+    const double sign = SlidesTo(record, i);
+    const Slide* const last =
+        Find(&slides_, contact, [&](const Slide& slide) { return slide.contact.SameAs(contact); });
+    if (sign != 0.0) {
+      if (last != nullptr && last->sign == -sign) {
+        changes_.push_back({ContactChange::Kind::kReversed, contact});
+      }
+      slides_now_.push_back({contact, sign});
+    } else if (last != nullptr && !last->ended) {
+      slides_now_.push_back({contact, last->sign, true});
+    }
+  }
+  Order(&slides_now_);
+  slides_.swap(slides_now_);
 }
 
 const std::vector<ContactChange>& DiscreteMapWatch::AddStep(const Model<double>& model,
@@ -134,9 +184,9 @@ const std::vector<ContactChange>& DiscreteMapWatch::AddStep(const Model<double>&
   for (const Touch& touch : last_) {
     if (!touch.continues) changes_.push_back({ContactChange::Kind::kBroken, touch.contact});
   }
-  std::sort(now_.begin(), now_.end(),
-            [](const Touch& x, const Touch& y) { return IsBefore(x.contact, y.contact); });
+  Order(&now_);
   last_.swap(now_);
+  AddSlides(record);
   first_ = false;
   return changes_;
 }

@@ -2,7 +2,8 @@
 #pragma once
 //
 // Where the derivative of a run by fixed steps is that of the discrete map x_k+1 = F(x_k, p) and
-// not of the motion: where a restitution acts, or a contact or limit is made or broken.
+// not of the motion: where a restitution acts, a contact or limit is made or broken, or a slip of
+// a contact turns back.
 //
 // The motion has the event at a time t*(p), and the derivative of the positions jumps there by
 // (v⁻ − v⁺) dt*/dp. The discrete map has it at a step, which does not follow p. After an impact
@@ -15,6 +16,10 @@
 // face and a corner of the same shapes continue one another without an impact nothing is made or
 // broken, nor where a body passes from one flush face to another of the same normal, which are one
 // surface; and a slip that ends changes no contact.
+//
+// A slip that turns back (a block slides up a slope and down again) has the acceleration a₁ before
+// and a₂ after the instant at which its speed is 0, and the motion's derivative of the speed by an
+// earlier one is a₂ / a₁ from then on. The map's is 1, or 0 where a step ends at rest meanwhile.
 
 #include <string>
 #include <vector>
@@ -25,12 +30,13 @@
 namespace tangible {
 
 struct ContactChange {
-  enum class Kind : unsigned char { kMade, kBroken, kRestitution };
+  enum class Kind : unsigned char { kMade, kBroken, kRestitution, kReversed };
   Kind kind = Kind::kMade;
   ActiveContact contact;
 };
 
-/// Where it happened, and what: "made", "broken" or "an impact with restitution".
+/// Where it happened, and what: "made", "broken", "an impact with restitution" or "a slip that
+/// turns back".
 std::string TextOf(const ModelStructure& structure, long step, double time,
                    const ContactChange& change);
 
@@ -56,10 +62,19 @@ class DiscreteMapWatch {
   // force moves, of the same normal, that does not continue otherwise.
   Touch* FindHandedOver(const Model<double>& model, const Touch& touch);
   bool ExistsAtStart(const Model<double>& model, const StepRecord& record, size_t contact) const;
+  // The direction of a slip in this step, 0 for none, or the last one of a slip that the step
+  // before this one ended.
+  struct Slide {
+    ActiveContact contact;
+    double sign = 0.0;
+    bool ended = false;
+  };
+  void AddSlides(const StepRecord& record);
 
   Lengths lengths_;
   bool first_ = true;
-  std::vector<Touch> last_, now_;     // ordered by their bodies
+  std::vector<Touch> last_, now_;  // ordered by their bodies
+  std::vector<Slide> slides_, slides_now_;
   std::vector<size_t> without_last_;  // closed contacts of this step that were not in the last
   std::vector<ContactChange> changes_;
 };

@@ -9,6 +9,9 @@ namespace tangible {
 /// Of the size of the larger body: a contact that begins with a deeper penetration has not closed,
 /// but has become the nearest of several. Gaps that close are located to 1e-10 of the body.
 inline constexpr double kBegunDepth = 1e-7;
+/// Of the way of a spring's ends past each other: where they come nearer, the spring has had no
+/// length. Straight motions round to 1e-15 of it.
+inline constexpr double kNoLength = 1e-9;
 /// Of the margin's own scale: relative distances to a jump below it make the verdict
 /// `discontinuous`.
 inline constexpr double kNearJumpMargin = 1e-6;

@@ -68,6 +68,33 @@ TEST(CertifyRollout, ATouchWithoutForceIsAKinkThoughItsTermsAreAllRounding) {
   EXPECT_EQ(apart.degenerate_rows, 0);
 }
 
+// A slider whose spring, 0.3 m long without a load, is fixed beside its rail, or on it: then the
+// force jumps where the slider passes, and its derivatives lack what that adds.
+TEST(CertifyRollout, ASpringThatHasNoLengthOnTheWayIsNamed) {
+  const auto slider = [](const char* anchor, const char* rest_length, const char* stepping) {
+    return std::string(R"({"gravity": [0, 0], "bodies": [
+      {"name": "slider", "shape": {"box": {"size": [0.2, 0.1]}}, "mass": 1, "position": [-1, 0],
+       "velocity": [3, 0]}],
+      "joints": [{"name": "rail", "type": "prismatic", "bodies": ["slider", "world"],
+                  "anchor": [0, 0], "axis": [1, 0]}],
+      "springs": [{"name": "spring", "bodies": ["slider", "world"],
+                   "anchors": [[0, 0], )") +
+           anchor + R"(], "stiffness": 2, "rest_length": )" + rest_length +
+           R"(}], "simulation": {"dt": 0.01, "duration": 0.8, "stepping": ")" + stepping + ""
+  }
+}
+";
+};
+for (const char* stepping : {"fixed", "event"}) {
+  const Certificate passes = Certify(slider("[0, 0]", "0.3", stepping));
+  EXPECT_TRUE(StartsWith(passes.verdict, "discontinuous: spring spring has no length at t = "))
+      << passes.verdict;
+  EXPECT_EQ(Certify(slider("[0, 0]", "0", stepping)).verdict, "trustworthy");
+  EXPECT_EQ(Certify(slider("[0, 0.2]", "0.3", stepping)).verdict, "trustworthy");
+  EXPECT_EQ(Certify(slider("[9, 0]", "0.3", stepping)).verdict, "trustworthy");
+}
+}
+
 TEST(CertifyRollout, LandingInTheLastStepIsFlaggedAndOneStepLaterNot) {
   const Certificate landing = Certify(FallingBall(0.05, R"({"dt": 0.01, "duration": 0.1})"));
   EXPECT_TRUE(

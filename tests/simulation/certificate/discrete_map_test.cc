@@ -190,6 +190,47 @@ TEST(DiscreteMapTest, FromTileToFlushTileNothingIsMadeOrBroken) {
   }
 }
 
+// A block that is thrown up a slope, in its own directions; it stops after 0.5 s at v = 4 and with
+// friction 0.25, and slides back: x'' = −8, then −4.
+std::string OnASlope(double v, const char* friction, double duration, const char* stepping) {
+  return R"({"gravity": [-6, -8], "bodies": [{"name": "b", "shape": {"box": {"size": [0.4, 0.2]}},
+      "mass": 1, "position": [0, 0.1], "velocity": [)" +
+         Exact(v) + R"(, 0], "friction": )" + friction +
+         R"(}, {"name": "floor", "static": true, "friction": )" + friction +
+         R"(, "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
+      "simulation": {"dt": 0.01, "stepping": ")" +
+         stepping + R"(", "duration": )" + Exact(duration) + "}}";
+}
+
+TEST(DiscreteMapTest, ASlipThatTurnsBack) {
+  for (const double v : {3.99, 4.0, 4.03, 4.05}) {
+    const Certificate back = CertificateOf(OnASlope(v, "0.25", 0.9, "fixed"));
+    EXPECT_EQ(back.discrete_map.substr(back.discrete_map.rfind(", ") + 2), "a slip that turns back")
+        << v;
+    EXPECT_EQ(back.verdict.rfind("of the discrete map: ", 0), 0u) << v << back.verdict;
+    ExpectNone(OnASlope(v, "0.25", 0.45, "fixed"));
+    ExpectNone(OnASlope(v, "0.25", 0.9, "event"));
+    // It rests where it stops.
+    ExpectNone(OnASlope(v, "1", 0.9, "fixed"));
+  }
+}
+
+// What the prefix is for: dx/dv is 0.7 in the motion, and in the map 0.9, or 0.5 where a step ends
+// at rest.
+TEST(DiscreteMapTest, TheMapsDerivativeBehindASlipThatTurnsBackIsNotTheMotions) {
+  for (const double v : {4.01, 4.07}) {
+    const auto derivative = [&](const char* stepping) {
+      const GradientResult result =
+          testing::Jacobian(SceneOf(OnASlope(v, "0.25", 0.9, stepping)), {"bodies/b/velocity/x"},
+                            GradientMethod::kAdjoint);
+      EXPECT_TRUE(result.done) << result.message;
+      return result.jacobian(0, 0);
+    };
+    EXPECT_NEAR(derivative("event"), v / 8 + 0.5 * (0.9 - v / 8), 1e-9) << v;
+    EXPECT_GT(std::abs(derivative("fixed") - derivative("event")), 0.15) << v;
+  }
+}
+
 TEST(DiscreteMapTest, WhereASmallerStepDoesNotHelp) {
   const char* e = R"(, "restitution": 0.5)";
   const Certificate bounces = CertificateOf(Ball{.y = 0.325, .ball = e, .floor = e}.Text());
