@@ -78,21 +78,18 @@ TEST(CertifyRollout, ASpringThatHasNoLengthOnTheWayIsNamed) {
       "joints": [{"name": "rail", "type": "prismatic", "bodies": ["slider", "world"],
                   "anchor": [0, 0], "axis": [1, 0]}],
       "springs": [{"name": "spring", "bodies": ["slider", "world"],
-                   "anchors": [[0, 0], )") +
+                   "anchors": [[-1, 0], )") +
            anchor + R"(], "stiffness": 2, "rest_length": )" + rest_length +
-           R"(}], "simulation": {"dt": 0.01, "duration": 0.8, "stepping": ")" + stepping + ""
+           R"(}], "simulation": {"dt": 0.01, "duration": 0.8, "stepping": ")" + stepping + "\"}}";
+  };
+  for (const char* stepping : {"fixed", "event"}) {
+    const Certificate passes = Certify(slider("[0, 0]", "0.3", stepping));
+    EXPECT_TRUE(StartsWith(passes.verdict, "discontinuous: spring spring has no length at t = "))
+        << passes.verdict;
+    EXPECT_EQ(Certify(slider("[0, 0]", "0", stepping)).verdict, "trustworthy");
+    EXPECT_EQ(Certify(slider("[0, 0.2]", "0.3", stepping)).verdict, "trustworthy");
+    EXPECT_EQ(Certify(slider("[9, 0]", "0.3", stepping)).verdict, "trustworthy");
   }
-}
-";
-};
-for (const char* stepping : {"fixed", "event"}) {
-  const Certificate passes = Certify(slider("[0, 0]", "0.3", stepping));
-  EXPECT_TRUE(StartsWith(passes.verdict, "discontinuous: spring spring has no length at t = "))
-      << passes.verdict;
-  EXPECT_EQ(Certify(slider("[0, 0]", "0", stepping)).verdict, "trustworthy");
-  EXPECT_EQ(Certify(slider("[0, 0.2]", "0.3", stepping)).verdict, "trustworthy");
-  EXPECT_EQ(Certify(slider("[9, 0]", "0.3", stepping)).verdict, "trustworthy");
-}
 }
 
 TEST(CertifyRollout, LandingInTheLastStepIsFlaggedAndOneStepLaterNot) {
