@@ -42,18 +42,28 @@ void StateFilter::Correct(long k, const VectorX<double>& observed) {
   const VectorX<double> difference = observed - Read(x_);
   const VectorX<double> weighted = factor.Solve(difference);
   surprise_ = difference.dot(weighted);
-  x_ += spread * weighted;
+  Move(k, spread * weighted);
   // Joseph's form, which stays positive semidefinite whatever rounding does.
   const MatrixX<double> gain = factor.Solve(MatrixX<double>(spread.transpose())).transpose();
   const MatrixX<double> kept = identity - gain * h;
   covariance_ = kept * covariance_ * kept.transpose() +
                 gain * options_.sigma.cwiseAbs2().asDiagonal() * gain.transpose();
-  // The correction goes along the joints, and to second order off them. Twists stay: those behind a
-  // fixed step are on the joints of the poses before it, and the next step brings them along.
-  const VectorX<double> corrected = x_;
-  double error = 0.0;
-  model_->ProjectOntoJoints(k, &x_, &error);
-  for (Eigen::Index i = 3; i < n; i += 6) x_.segment<3>(i) = corrected.segment<3>(i);
+}
+
+void StateFilter::Move(long k, const VectorX<double>& change) {
+  // Along the joints to first order, and on them to second: poses go where a projection of both ends
+  // takes them. What a fixed step leaves of the joints' errors stays, as it is the plant's too, and
+  // so do twists, which the next step brings along.
+  const auto onto_joints = [&](VectorX<double> x) {
+    double error = 0.0;
+    model_->ProjectOntoJoints(k, &x, &error);
+    return x;
+  };
+  const VectorX<double> moved = onto_joints(x_ + change) - onto_joints(x_);
+  for (Eigen::Index i = 0; i < x_.size(); i += 6) {
+    x_.segment<3>(i) += moved.segment<3>(i);
+    x_.segment<3>(i + 3) += change.segment<3>(i + 3);
+  }
 }
 
 bool StateFilter::Advance(long k, const VectorX<double>& u, std::string* error) {

@@ -10,8 +10,8 @@
 //   x̂ += P Hᵀ S⁻¹ (y − h(x̂)),   P −= P Hᵀ S⁻¹ H P,   S = H P Hᵀ + σ²
 //
 // The random acceleration, held over a step, stands for what the model does not have. It goes
-// through the step as velocities do, so that the covariance stays on the joints; what the
-// correction takes poses off them is put back (joint_state.h).
+// through the step as velocities do, so that the covariance stays along the joints, and corrections
+// move poses along them (joint_state.h).
 
 #include <string>
 #include <vector>
@@ -54,6 +54,8 @@ class StateFilter {
   double surprise() const { return surprise_; }
 
  private:
+  void Move(long k, const VectorX<double>& change);
+
   EngineStep* model_;
   FilterOptions options_;
   VectorX<double> x_;
