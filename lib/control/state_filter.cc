@@ -51,9 +51,8 @@ void StateFilter::Correct(long k, const VectorX<double>& observed) {
 }
 
 void StateFilter::Move(long k, const VectorX<double>& change) {
-  // Along the joints to first order, and on them to second: poses go where a projection of both ends
-  // takes them. What a fixed step leaves of the joints' errors stays, as it is the plant's too, and
-  // so do twists, which the next step brings along.
+  // Poses go from one point on the joints to another. What a fixed step leaves of the joints'
+  // errors stays, as it is the plant's too, and twists are brought along by the next step.
   const auto onto_joints = [&](VectorX<double> x) {
     double error = 0.0;
     model_->ProjectOntoJoints(k, &x, &error);

@@ -129,7 +129,7 @@ TEST_F(TangibleControlTest, RecedingHorizonsFromNoisyObservations) {
   EXPECT_LT(point["estimates"]["error_rms"]["cart/x"].get<double>(), 0.01);
 
   for (const auto& [observations, message] :
-       {std::pair(R"({})", "/mpc/observations: missing key \"sensors\""),
+       {std::pair(R"({})", "/mpc/observations/sensors: missing"),
         {R"({"sensors": []})", "/mpc/observations/sensors: expected at least one sensor, got none"},
         {R"({"sensors": [{"sigma": 1}]})",
          "/mpc/observations/sensors/0: expected one of state and point, got neither"},
@@ -139,7 +139,7 @@ TEST_F(TangibleControlTest, RecedingHorizonsFromNoisyObservations) {
          "/mpc/observations/sensors/0/state: expected a number of the state"},
         {R"({"sensors": [{"state": "cart/x", "sigma": 0}]})",
          "/mpc/observations/sensors/0/sigma: expected"},
-        {R"({"sensors": [{"state": "cart/x"}]})", "/mpc/observations/sensors/0: missing"},
+        {R"({"sensors": [{"state": "cart/x"}]})", "/mpc/observations/sensors/0/sigma: missing"},
         {R"({"sensors": [{"state": "cart/x", "sigma": 1}], "every": 0})",
          "/mpc/observations/every: expected"},
         {R"({"sensors": [{"state": "cart/x", "sigma": 1}], "initial_sigma": -1})",
