@@ -151,11 +151,11 @@ def swing_ups(folder: pathlib.Path, name: str, make: Make, bodies: list[str], up
           f"median CPU {statistics.median(seconds):.2f} s", flush=True)
 
 
-# A camera that sees the cart to 2 mm and the pole to 0.01 rad, and no speeds. A model off by 30 %
-# is wrong by some m/s².
+# A camera that sees the cart to 2 mm and the pole to 0.01 rad, and no speeds. A filter that trusts
+# its model less, by accelerations of 5 m/s2, estimates the rate of a hanging pole to 0.13 rad/s only,
+# and plans swing it to one side and the other in turn.
 OBSERVATIONS = {"sensors": [{"state": "cart/x", "sigma": 0.002},
-                            {"state": "pole/angle", "sigma": 0.01}],
-                "acceleration_sigma": 5}
+                            {"state": "pole/angle", "sigma": 0.01}]}
 
 
 def receding_horizon(folder: pathlib.Path, options: argparse.Namespace,
