@@ -20,7 +20,7 @@ namespace {
 class OutlinePair {
  public:
   OutlinePair(const Outline& outline, int run, const ShapeView<double>& other,
-              const Pose<double>& pose, SeamSide side)
+              const Pose<double>& pose, SeamSide side, const ShapeSeams* seams)
       : outline_(outline),
         run_(run),
         of_(outline.run(run)),
@@ -28,6 +28,7 @@ class OutlinePair {
         is_ellipse_(other.type == ShapeType::kEllipse),
         shape_(other),
         pose_(pose),
+        seams_(seams),
         other_(other, pose, Vector2<double>(0.0, 0.0)) {}
 
   int Find(double max_gap, ContactFeature features[2]) {
@@ -60,6 +61,15 @@ class OutlinePair {
                : other_.VertexAt(vertex);
   }
   double HeightOf(const Vector2<double>& x) const { return of_.normal.dot(x - of_.start); }
+  /// Whether neighbours of B leave a vertex of it free towards a direction of the outline's frame.
+  bool IsFree(int vertex, const Vector2<double>& direction) const {
+    return seams_ == nullptr || !seams_->vertices[vertex].is_bounded ||
+           seams_->vertices[vertex].Allows(pose_.rotation.Inverse(direction));
+  }
+  /// Whether they leave an edge of it free at a foot.
+  bool IsFreeAt(int edge, double s) const {
+    return seams_ == nullptr || seams_->edges[edge].IsFree(s, s);
+  }
   void Add(const ContactFeature& feature, double gap) { found_[count_++] = {feature, gap}; }
 
   void FindOnRun() {
@@ -68,7 +78,7 @@ class OutlinePair {
     for (int i = 0; i < other_.Size(); ++i) {
       const Vector2<double> x = PointAt(i);
       const double height = HeightOf(x);
-      if (height < lowest && outline_.IsOver(run_, x)) {
+      if (height < lowest && outline_.IsOver(run_, x) && IsFree(i, -of_.normal)) {
         lowest = height;
         at = i;
       }
@@ -79,7 +89,7 @@ class OutlinePair {
     for (const int i : {other_.Next(at), other_.Previous(at)}) {
       const Vector2<double> x = other_.VertexAt(i);
       if (i != at && (second < 0 || HeightOf(x) < HeightOf(other_.VertexAt(second))) &&
-          x != other_.VertexAt(at) && outline_.IsOver(run_, x)) {
+          x != other_.VertexAt(at) && outline_.IsOver(run_, x) && IsFree(i, -of_.normal)) {
         second = i;
       }
     }
@@ -94,9 +104,12 @@ class OutlinePair {
   }
 
   void TryStart() {
+    const SeamVertex* const bound = outline_.BoundedStart(run_);
+    if (bound != nullptr && !bound->is_open) return;
     const int previous = of_.before == OutlineJoint::kConvex ? outline_.Previous(run_) : -1;
-    const NormalCone cone{
-        previous >= 0 ? outline_.run(previous).normal : Vector2<double>(-of_.tangent), of_.normal};
+    const NormalCone cone = BoundedCone(
+        {previous >= 0 ? outline_.run(previous).normal : Vector2<double>(-of_.tangent), of_.normal},
+        bound);
     Try(of_.first, of_.start, cone, 0.0, [&](const Vector2<double>& x) {
       const bool is_beyond = of_.tangent.dot(x - of_.start) < 0.0 && HeightOf(x) >= 0.0;
       return !outline_.IsAfterStart(run_, x) &&
@@ -105,10 +118,13 @@ class OutlinePair {
   }
 
   void TryEnd() {
+    const SeamVertex* const bound = outline_.BoundedEnd(run_);
+    if (bound != nullptr && !bound->is_open) return;
     const Vector2<double> end = outline_.EndPlace(run_);
-    Try(of_.last + 1, end, {of_.normal, of_.tangent}, of_.length, [&](const Vector2<double>& x) {
-      return !outline_.IsBeforeEnd(run_, x) && HeightOf(x) >= 0.0;
-    });
+    Try(of_.last + 1, end, BoundedCone({of_.normal, of_.tangent}, bound), of_.length,
+        [&](const Vector2<double>& x) {
+          return !outline_.IsBeforeEnd(run_, x) && HeightOf(x) >= 0.0;
+        });
   }
 
   /// Adds the contact of the corner v with B. `is_beyond` says whether a point is in the cone: the
@@ -127,7 +143,9 @@ class OutlinePair {
         nearest = j;
       }
     }
-    if (nearest >= 0 && best > 0.0 && is_beyond(other_.VertexAt(nearest))) {
+    if (nearest >= 0 && best > 0.0 && is_beyond(other_.VertexAt(nearest)) &&
+        (!cone.is_bounded || cone.Contains((other_.VertexAt(nearest) - v).normalized())) &&
+        IsFree(nearest, v - other_.VertexAt(nearest))) {
       Add(OnCorner(corner, nearest), std::sqrt(best) - other_.Radius());
     }
   }
@@ -145,14 +163,16 @@ class OutlinePair {
         height = own;
         edge = i;
       }
-      if (own > of_allowed && IsAllowed(cone, line) && IsOverFace(line, v)) {
+      if (own > of_allowed && IsAllowed(cone, line) && IsOverFace(i, line, v)) {
         of_allowed = own;
         allowed = i;
       }
     }
     if (edge < 0) return false;
+    const CoreEdge best = other_.Edge(edge);
+    if (height >= 0.0 && !IsFreeAt(edge, best.tangent.dot(v - best.start))) return false;
     const bool is_inside = height < 0.0 && other_.Size() > 2;
-    if (!is_inside && edge != allowed) return IsOverFace(other_.Edge(edge), v);
+    if (!is_inside && edge != allowed) return IsOverFace(edge, best, v);
     if (allowed >= 0 && !IsTaken(foot, other_.Edge(allowed)) && !IsTakenBefore(v, allowed)) {
       Add(CornerOnEdge(corner, allowed), of_allowed - other_.Radius());
     }
@@ -164,10 +184,14 @@ class OutlinePair {
     const Vector2<double> direction = -line.Normal();
     return outline_.IsPolygon() ? cone.Faces(direction) : cone.Contains(direction);
   }
-  static bool IsOverFace(const CoreEdge& line, const Vector2<double>& v) {
+  bool IsOverFace(int edge, const CoreEdge& line, const Vector2<double>& v) const {
     const double s = line.tangent.dot(v - line.start);
-    const double room = kLengthRounding * line.length;
-    return s >= -room && s <= line.length + room;
+    const auto room = [&](int vertex) {
+      return seams_ != nullptr && seams_->vertices[vertex].is_bounded
+                 ? seams_->vertices[vertex].beyond
+                 : kLengthRounding * line.length;
+    };
+    return s >= -room(edge) && s <= line.length + room(other_.Next(edge)) && IsFreeAt(edge, s);
   }
   /// Whether a vertex of B's face above the corner is a contact already. A face of a polygon's
   /// other body may face the edge that ends at the corner, and then has none on this one.
@@ -211,6 +235,7 @@ class OutlinePair {
   const bool is_first_, is_ellipse_;
   const ShapeView<double>& shape_;
   const Pose<double>& pose_;
+  const ShapeSeams* const seams_;  ///< of B, or null
   const ConvexCore other_;
   Candidate found_[4];
   double foot_[2] = {0.0, 0.0};  ///< of the contacts on the run
@@ -224,13 +249,13 @@ namespace tangible {
 
 int FindOutlineFeatures(const Outline& outline, int run, const ShapeView<double>& shape_a,
                         const Pose<double>& pose_a, const ShapeView<double>& shape_b,
-                        const Pose<double>& pose_b, SeamSide side, double max_gap,
-                        ContactFeature features[2]) {
+                        const Pose<double>& pose_b, SeamSide side, const ShapeSeams* seams,
+                        double max_gap, ContactFeature features[2]) {
   const bool is_first = side == SeamSide::kFirst;
   const ShapeView<double>& other = is_first ? shape_b : shape_a;
   const Pose<double> relative =
       internal::RelativeTo(is_first ? pose_a : pose_b, is_first ? pose_b : pose_a);
-  return internal::OutlinePair(outline, run, other, relative, side).Find(max_gap, features);
+  return internal::OutlinePair(outline, run, other, relative, side, seams).Find(max_gap, features);
 }
 
 int FindPlaneFeature(const Outline& outline, int run, const ShapeView<double>& plane,

@@ -15,6 +15,7 @@ namespace tangible::internal {
 /// of the edge that starts there.
 struct NormalCone {
   Vector2<double> first, last;
+  bool is_bounded = false;  ///< by a neighbour at whose seam the corner is
   bool Contains(const Vector2<double>& direction) const {
     return Cross(first, direction) >= -kFlushTurn && Cross(direction, last) >= -kFlushTurn &&
            direction.dot(first + last) > 0.0;
@@ -22,9 +23,15 @@ struct NormalCone {
   /// Whether a face whose outward normal is −`direction` may come to lie on one of the corner's
   /// edges: its contact with the corner is the second one of two faces that are nearly parallel.
   bool Faces(const Vector2<double>& direction) const {
-    return Contains(direction) || direction.dot(first) > kFacing || direction.dot(last) > kFacing;
+    return Contains(direction) ||
+           (!is_bounded && (direction.dot(first) > kFacing || direction.dot(last) > kFacing));
   }
 };
+
+/// The cone that a neighbour leaves of a corner's; `bound` null: it bounds nothing.
+inline NormalCone BoundedCone(const NormalCone& cone, const SeamVertex* bound) {
+  return bound == nullptr ? cone : NormalCone{bound->first, bound->last, true};
+}
 
 /// `pose` in a frame.
 inline Pose<double> RelativeTo(const Pose<double>& frame, const Pose<double>& pose) {

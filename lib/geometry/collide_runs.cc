@@ -23,35 +23,44 @@ struct RunCorner {
   int before = -1, after = -1;  ///< the runs that end and start there; −1: none
 };
 
-bool IsCorner(OutlineJoint joint) {
-  return joint == OutlineJoint::kConvex || joint == OutlineJoint::kEnd;
+bool IsOpen(const SeamVertex* bound) { return bound == nullptr || bound->is_open; }
+
+/// Whether the start of a run is a corner that neighbours leave free; and its end, at any joint.
+bool StartsAtCorner(const Outline& outline, int run) {
+  const OutlineJoint joint = outline.run(run).before;
+  return (joint == OutlineJoint::kConvex || joint == OutlineJoint::kEnd) &&
+         IsOpen(outline.BoundedStart(run));
+}
+bool EndsAtCorner(const Outline& outline, int run) {
+  const OutlineJoint joint = outline.run(run).after;
+  return (joint == OutlineJoint::kConvex || joint == OutlineJoint::kEnd) &&
+         IsOpen(outline.BoundedEnd(run));
 }
 
 RunCorner StartOf(const Outline& outline, int run) {
   const OutlineRun& of = outline.run(run);
   const int before = of.before == OutlineJoint::kEnd ? -1 : outline.Previous(run);
-  return {of.first,
-          of.start,
-          {before >= 0 ? outline.run(before).normal : Vector2<double>(-of.tangent), of.normal},
-          before,
-          run};
+  const NormalCone cone{before >= 0 ? outline.run(before).normal : Vector2<double>(-of.tangent),
+                        of.normal};
+  return {of.first, of.start, BoundedCone(cone, outline.BoundedStart(run)), before, run};
 }
 
 RunCorner EndCornerOf(const Outline& outline, int run) {
   const OutlineRun& of = outline.run(run);
   const int after = of.after == OutlineJoint::kEnd ? -1 : outline.Next(run);
-  return {outline.EndOf(run),
-          outline.EndPlace(run),
-          {of.normal, after >= 0 ? outline.run(after).normal : of.tangent},
-          run,
-          after};
+  return {outline.EndOf(run), outline.EndPlace(run),
+          BoundedCone({of.normal, after >= 0 ? outline.run(after).normal : of.tangent},
+                      outline.BoundedEnd(run)),
+          run, after};
 }
 
 /// The corners that belong to a run.
 int CornersOf(const Outline& outline, int run, RunCorner corners[2]) {
   int count = 0;
-  if (IsCorner(outline.run(run).before)) corners[count++] = StartOf(outline, run);
-  if (outline.run(run).after == OutlineJoint::kEnd) corners[count++] = EndCornerOf(outline, run);
+  if (StartsAtCorner(outline, run)) corners[count++] = StartOf(outline, run);
+  if (outline.run(run).after == OutlineJoint::kEnd && EndsAtCorner(outline, run)) {
+    corners[count++] = EndCornerOf(outline, run);
+  }
   return count;
 }
 
@@ -59,6 +68,7 @@ int CornersOf(const Outline& outline, int run, RunCorner corners[2]) {
 /// the runs, so that rounding leaves out no place and takes none twice.
 bool IsBeyond(const Outline& outline, const RunCorner& corner, const Vector2<double>& x) {
   const Vector2<double> arm = x - corner.place;
+  if (corner.cone.is_bounded && !corner.cone.Contains(arm.normalized())) return false;
   if (corner.after < 0) {
     const OutlineRun& before = outline.run(corner.before);
     return !outline.IsBeforeEnd(corner.before, x) && before.normal.dot(arm) >= 0.0;
@@ -106,8 +116,8 @@ bool IsAboveCorner(const View& view, const View& back, const RunCorner& corner, 
     }
     return false;
   };
-  return (IsCorner(of.before) && takes(StartOf(view.other, run), 0.0)) ||
-         (IsCorner(of.after) && takes(EndCornerOf(view.other, run), of.length));
+  return (StartsAtCorner(view.other, run) && takes(StartOf(view.other, run), 0.0)) ||
+         (EndsAtCorner(view.other, run) && takes(EndCornerOf(view.other, run), of.length));
 }
 
 class RunPair {

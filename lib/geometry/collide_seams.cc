@@ -43,7 +43,7 @@ class SeamPair {
         feature.kind == (is_first_ ? FeatureKind::kEdgeVertex : FeatureKind::kVertexEdge);
     if (!of_edge) {
       return !seams_.vertices[on_tiled].is_bounded ||
-             (!is_plane_ && IsAllowed(on_tiled, NormalOf(feature)));
+             (!is_plane_ && seams_.vertices[on_tiled].Allows(NormalOf(feature)));
     }
     const SeamEdge& edge = seams_.edges[on_tiled];
     const SeamVertex& start = seams_.vertices[on_tiled];
@@ -53,7 +53,7 @@ class SeamPair {
     }
     const double along = AlongEdge(on_tiled, feature);
     return (!start.is_bounded || along >= -start.beyond) &&
-           (!end.is_bounded || along <= edge.length + end.beyond) && IsFree(edge, along, along);
+           (!end.is_bounded || along <= edge.length + end.beyond) && edge.IsFree(along, along);
   }
 
   int Find(double max_gap, ContactFeature features[2]) {
@@ -98,20 +98,6 @@ class SeamPair {
                      : ContactFeature{FeatureKind::kEdgeVertex, edge, vertex};
   }
 
-  /// Whether a vertex of T is a contact with a normal of its cone.
-  bool IsAllowed(int vertex, const Vector2<double>& normal) const {
-    const SeamVertex& at = seams_.vertices[vertex];
-    return at.is_open && Cross(at.first, normal) >= -kFlushTurn &&
-           Cross(normal, at.last) >= -kFlushTurn && normal.dot(at.first + at.last) > 0.0;
-  }
-  /// Whether something between two places of an edge is not hidden.
-  static bool IsFree(const SeamEdge& edge, double low, double high) {
-    const auto is_over = [&](const FreePart& part) {
-      return high >= (part.from > 0.0 ? part.from : -kInfinity) &&
-             low <= (part.to < edge.length ? part.to : kInfinity);
-    };
-    return edge.is_whole || std::any_of(edge.parts.begin(), edge.parts.end(), is_over);
-  }
   /// How far an edge of T reaches beyond a vertex.
   double Reach(int vertex, double length) const {
     const SeamVertex& at = seams_.vertices[vertex];
@@ -173,7 +159,7 @@ void SeamPair::FindOfRound() {
     const double along = AlongEdge(i, feature);
     const double gap = Evaluate(feature).gap;
     const bool is_apart = gap + radius >= 0.0;
-    if (IsOver(i, along) && IsFree(edge, along, along) &&
+    if (IsOver(i, along) && edge.IsFree(along, along) &&
         (is_apart || IsInside(tiled_, other_.VertexAt(0)))) {
       take({feature, gap});
     }
@@ -181,7 +167,7 @@ void SeamPair::FindOfRound() {
   for (int i = 0; i < tiled_.Size(); ++i) {
     const ContactFeature feature = OnVertex(i, 0);
     const ContactGeometry<double> contact = Evaluate(feature);
-    if (contact.gap + radius > 0.0 && IsAllowed(i, OutOfTiled(contact))) {
+    if (contact.gap + radius > 0.0 && seams_.vertices[i].Allows(OutOfTiled(contact))) {
       take({feature, contact.gap});
     }
   }
@@ -192,7 +178,7 @@ void SeamPair::AddOnEdge(int edge, int vertex, double low, double high) {
   const CoreEdge line = tiled_.Edge(edge);
   const Vector2<double> point = other_.VertexAt(vertex);
   const double height = line.Height(point);
-  if (IsFree(seams_.edges[edge], low, high) &&
+  if (seams_.edges[edge].IsFree(low, high) &&
       (height >= -2.0 * kFlushStep || IsInside(tiled_, point))) {
     found_[num_found_++] = {OnEdge(edge, vertex), height - other_.Radius()};
   }
@@ -203,7 +189,7 @@ void SeamPair::AddOnOther(const CoreFace& face, int vertex) {
   const Vector2<double> point = tiled_.VertexAt(vertex);
   const double height = face.line.Height(point);
   const Vector2<double> normal = frame_.rotation.Inverse(Vector2<double>(-face.line.Normal()));
-  if ((!seams_.vertices[vertex].is_bounded || IsAllowed(vertex, normal)) &&
+  if ((!seams_.vertices[vertex].is_bounded || seams_.vertices[vertex].Allows(normal)) &&
       (height >= -2.0 * kFlushStep || IsInside(other_, point))) {
     found_[num_found_++] = {OnOther(vertex, face.edge), height - other_.Radius()};
   }
@@ -250,7 +236,7 @@ void SeamPair::Keep(double separation) {
 
 void SeamPair::TryEdgeOfTiled(int i) {
   const CoreEdge edge = tiled_.Edge(i);
-  if (!(edge.length > 0.0) || (!seams_.edges[i].is_whole && seams_.edges[i].parts.empty())) {
+  if (!(edge.length > 0.0) || seams_.edges[i].IsHidden()) {
     return;
   }
   const auto [deepest, separation] = other_.DeepestOver(edge);
@@ -294,7 +280,8 @@ void SeamPair::FindOfCore() {
       const ContactFeature feature = OnVertex(i, j);
       const ContactGeometry<double> contact = Evaluate(feature);
       if (contact.gap + other_.Radius() > 0.0 && contact.gap < max_gap_ &&
-          IsAllowed(i, OutOfTiled(contact)) && (count_ == 0 || contact.gap < best_[0].gap)) {
+          seams_.vertices[i].Allows(OutOfTiled(contact)) &&
+          (count_ == 0 || contact.gap < best_[0].gap)) {
         best_[0] = {feature, contact.gap};
         count_ = 1;
       }

@@ -170,6 +170,7 @@ bool Outline::IsAfterStart(int run, const Vector2<double>& x) const {
   const OutlineRun& of = runs_[run];
   const double s = FootOver(of, x);
   const double h = HeightOver(of, x);
+  if (const SeamVertex* start = BoundedStart(run); start != nullptr) return s >= -start->beyond;
   if (s >= -RoomOf(of)) {
     return h >= 0.0 || s >= -h * of.bisector_before - RoomOf(of);
   }
@@ -182,6 +183,7 @@ bool Outline::IsBeforeEnd(int run, const Vector2<double>& x) const {
   const OutlineRun& of = runs_[run];
   const double left = of.length - FootOver(of, x);
   const double h = HeightOver(of, x);
+  if (const SeamVertex* end = BoundedEnd(run); end != nullptr) return left >= -end->beyond;
   if (left >= -RoomOf(of)) {
     return h >= 0.0 || left >= -h * of.bisector_after - RoomOf(of);
   }
@@ -197,7 +199,7 @@ bool Outline::IsBehindFree(int run, const Vector2<double>& x, double depth) cons
     if (i == run || is_free) return;
     const double s = FootOver(runs_[i], x);
     const double h = HeightOver(runs_[i], x);
-    is_free = h >= 0.0 && h < depth && s >= 0.0 && s <= runs_[i].length;
+    is_free = h >= 0.0 && h < depth && s >= 0.0 && s <= runs_[i].length && !IsHiddenAt(i, s);
   });
   return is_free;
 }
@@ -214,13 +216,17 @@ bool Outline::IsNearest(int run, const Vector2<double>& x, double depth) const {
     if (i == run || i == before || i == after || !is_nearest) return;
     const double other = -HeightOver(runs_[i], x);
     const bool is_nearer = other >= 0.0 && (other < depth || (other == depth && i < run));
-    if (is_nearer && IsAfterStart(i, x) && IsBeforeEnd(i, x)) is_nearest = false;
+    if (is_nearer && IsAfterStart(i, x) && IsBeforeEnd(i, x) &&
+        !IsHiddenAt(i, FootOver(runs_[i], x))) {
+      is_nearest = false;
+    }
   });
   return is_nearest;
 }
 
 bool Outline::IsOver(int run, const Vector2<double>& x) const {
   if (!IsAfterStart(run, x) || !IsBeforeEnd(run, x)) return false;
+  if (IsHiddenAt(run, FootOver(runs_[run], x))) return false;
   const double h = HeightOver(runs_[run], x);
   if (h >= -kFlushStep) return true;
   return is_polygon_ ? IsNearest(run, x, -h) : !IsBehindFree(run, x, -h);

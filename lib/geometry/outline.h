@@ -24,6 +24,7 @@
 // only if it is in the polygon, and of the runs that it is over only the nearest one, or two that
 // meet at a concave joint. What is deep in the solid is pushed out through the nearest edge.
 
+#include <utility>
 #include <vector>
 
 #include "tangible/geometry/broad_phase.h"
@@ -50,6 +51,18 @@ class Outline {
  public:
   /// O(n) for n points, no two of which that follow each other are equal; O(n log n) of a polygon.
   explicit Outline(const ShapeView<double>& shape);
+
+  /// What neighbours leave of the outline, from FindSeams: a part of a run that they hide is over
+  /// nothing, and at a corner in a neighbour the run reaches to it, whatever is behind.
+  void SetSeams(ShapeSeams seams) { seams_ = std::move(seams); }
+  bool HasSeams() const { return !seams_.edges.empty(); }
+  /// Whether nothing of a run is a contact.
+  bool IsHidden(int run) const { return HasSeams() && seams_.edges[run].IsHidden(); }
+  /// The corner at a run's start, or at its end, where a neighbour contains it, or nullptr.
+  const SeamVertex* BoundedStart(int run) const { return Bounded(run); }
+  const SeamVertex* BoundedEnd(int run) const {
+    return Bounded(runs_[run].after == OutlineJoint::kEnd ? num_runs() : Next(run));
+  }
 
   bool IsPolygon() const { return is_polygon_; }
   /// The runs of a polygon that start at its convex hull, or at most kNearHull inside: their starts
@@ -96,13 +109,18 @@ class Outline {
       return;
     }
     if (high - low == 1) {
-      visit(low);
+      // The box of a leaf without a run overlaps one that has no end.
+      if (low < num_runs()) visit(low);
       return;
     }
     const int middle = (low + high) / 2;
     VisitNode(2 * node, low, middle, box, visit);
     VisitNode(2 * node + 1, middle, high, box, visit);
   }
+  const SeamVertex* Bounded(int vertex) const {
+    return HasSeams() && seams_.vertices[vertex].is_bounded ? &seams_.vertices[vertex] : nullptr;
+  }
+  bool IsHiddenAt(int run, double s) const { return HasSeams() && !seams_.edges[run].IsFree(s, s); }
   bool IsBehindFree(int run, const Vector2<double>& x, double depth) const;
   /// What is behind a run of an open line may be anywhere in the solid.
   bool MayContain(const Vector2<double>& x) const { return !is_polygon_ || Contains(x); }
@@ -112,6 +130,7 @@ class Outline {
   void BuildHull(const ShapeView<double>& shape);
 
   std::vector<OutlineRun> runs_;
+  ShapeSeams seams_;           ///< empty: there are none
   std::vector<double> along_;  ///< the foot of each edge's start over its run
   int num_edges_ = 0;
   bool is_closed_ = false, is_polygon_ = false;
@@ -125,11 +144,12 @@ Aabb BoxOfOutline(const Outline& outline, const Pose<double>& pose, double margi
 
 /// FindContactFeatures for one run of a polyline and another shape, which is no half-plane: the
 /// lowest vertex over the run and its lower neighbour over it, and the corners at which the run
-/// starts or the outline ends. `side`: which one the polyline is.
+/// starts or the outline ends. `side`: which one the polyline is. `seams`: those of the other shape,
+/// or null.
 int FindOutlineFeatures(const Outline& outline, int run, const ShapeView<double>& shape_a,
                         const Pose<double>& pose_a, const ShapeView<double>& shape_b,
-                        const Pose<double>& pose_b, SeamSide side, double max_gap,
-                        ContactFeature features[2]);
+                        const Pose<double>& pose_b, SeamSide side, const ShapeSeams* seams,
+                        double max_gap, ContactFeature features[2]);
 
 /// The same for the start of a run of a polygon and a half-plane.
 int FindPlaneFeature(const Outline& outline, int run, const ShapeView<double>& plane,

@@ -60,7 +60,7 @@ NearestContact NearestOfShape(const Numbers& a, const Pose<double>& pose_a,
   for (int i = 0; i < outline.num_runs(); ++i) {
     ContactFeature features[2];
     const int count = FindOutlineFeatures(outline, i, PolygonOf(a), pose_a, b, pose_b,
-                                          SeamSide::kFirst, kFar, features);
+                                          SeamSide::kFirst, nullptr, kFar, features);
     for (int k = 0; k < count; ++k) {
       nearest.Take(EvaluateContact(features[k], PolygonOf(a), pose_a, b, pose_b));
     }

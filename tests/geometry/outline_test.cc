@@ -28,7 +28,7 @@ RunContacts CollideRun(const std::vector<double>& points, int run, ShapeType typ
   const Pose<double> pose(Vector2<double>(x, y), angle);
   RunContacts found;
   found.count = FindOutlineFeatures(Outline(line), run, shape, pose, line, frame, SeamSide::kSecond,
-                                    kInfinity, found.features);
+                                    nullptr, kInfinity, found.features);
   for (int k = 0; k < found.count; ++k) {
     found.contacts[k] = EvaluateContact(found.features[k], shape, pose, line, frame);
   }

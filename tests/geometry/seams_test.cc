@@ -6,6 +6,7 @@
 #include <cmath>
 #include <vector>
 
+#include "tangible/geometry/outline.h"
 #include "tangible/geometry/tolerances.h"
 
 namespace tangible {
@@ -212,6 +213,98 @@ TEST(SeamsTest, WhereNothingIsHiddenTheFeaturesAreTheSame) {
     for (int k = 0; k < found.count; ++k) {
       EXPECT_EQ(features[k], found.features[k]);
     }
+  }
+}
+
+// What one body leaves of the first; outlines where they are given.
+ShapeSeams SeamsOf(const Body& body, const Outline* outline, const Body& neighbour,
+                   const Outline* other) {
+  PlacedShape placed = body.Placed();
+  placed.outline = outline;
+  PlacedShape beside = neighbour.Placed();
+  beside.outline = other;
+  ShapeSeams seams;
+  FlushSteps steps;
+  EXPECT_TRUE(FindSeams(placed, {beside}, &seams, &steps));
+  EXPECT_EQ(steps.count, 0);
+  return seams;
+}
+
+// A line up, along and down, which is solid below, beside a box as high as it and one half as high.
+TEST(SeamsTest, OfAPolylineBesideABox) {
+  // Against the way of the points the solid would be on the right: they go from right to left.
+  const Body line{ShapeType::kPolyline, {3.0, 0.0, 3.0, 1.0, 0.0, 1.0, 0.0, 0.0}};
+  const Outline outline(line.Placed().shape);
+  ASSERT_EQ(outline.num_runs(), 3);
+  const ShapeSeams flush = SeamsOf(line, &outline, Tile(-0.5, 1.0, 1.0, 1.0), nullptr);
+  ASSERT_EQ(flush.edges.size(), 3u);
+  ASSERT_EQ(flush.vertices.size(), 4u);
+  EXPECT_TRUE(flush.edges[0].is_whole);
+  EXPECT_TRUE(flush.edges[1].is_whole);
+  EXPECT_TRUE(flush.edges[2].IsHidden());
+  EXPECT_FALSE(flush.vertices[1].is_bounded);
+  EXPECT_TRUE(flush.vertices[2].is_bounded);
+  EXPECT_FALSE(flush.vertices[2].is_open);
+  const ShapeSeams lower = SeamsOf(line, &outline, Tile(-0.5, 0.5, 1.0, 0.5), nullptr);
+  EXPECT_FALSE(lower.vertices[2].is_bounded);
+  ASSERT_EQ(lower.edges[2].parts.size(), 1u);
+  EXPECT_DOUBLE_EQ(lower.edges[2].parts[0].from, 0.0);
+  EXPECT_NEAR(lower.edges[2].parts[0].to, 0.5, 1e-7);
+
+  // What the line leaves of the boxes: nothing of the sides that it covers.
+  const ShapeSeams box = SeamsOf(Tile(-0.5, 1.0, 1.0, 1.0), nullptr, line, &outline);
+  int hidden = 0, closed = 0;
+  for (int i = 0; i < 4; ++i) {
+    hidden += box.edges[i].IsHidden() ? 1 : 0;
+    closed += box.vertices[i].is_open ? 0 : 1;
+    if (box.edges[i].IsHidden()) {
+      EXPECT_GT(box.edges[i].normal.x(), 0.9);
+    }
+    if (!box.vertices[i].is_open) {
+      EXPECT_GT(box.edges[i].start.x(), 0.0);
+    }
+  }
+  EXPECT_EQ(hidden, 1);
+  EXPECT_GE(closed, 1);
+}
+
+// A line that begins at a box's corner and goes on at its height: behind it everything is solid.
+TEST(SeamsTest, OfABoxAtTheEndOfALine) {
+  const Body line{ShapeType::kPolyline, {3.0, 1.0, 0.0, 1.0}};
+  const Outline outline(line.Placed().shape);
+  const ShapeSeams box = SeamsOf(Tile(-0.5, 1.0, 1.0, 1.0), nullptr, line, &outline);
+  for (int i = 0; i < 4; ++i) {
+    const bool is_right = box.edges[i].normal.x() > 0.9;
+    EXPECT_EQ(box.edges[i].IsHidden(), is_right);
+    EXPECT_EQ(box.vertices[i].is_open, box.edges[i].start.x() < 0.0);
+  }
+  const ShapeSeams of_line = SeamsOf(line, &outline, Tile(-0.5, 1.0, 1.0, 1.0), nullptr);
+  ASSERT_EQ(of_line.vertices.size(), 2u);
+  EXPECT_TRUE(of_line.vertices[0].is_open);
+  EXPECT_FALSE(of_line.vertices[1].is_open);
+  EXPECT_TRUE(of_line.edges[0].is_whole);
+}
+
+// A polygon with a notch whose floor lies on a box's level: its wall is hidden below that level.
+TEST(SeamsTest, OfABoxInTheNotchOfAPolygon) {
+  const Body notched{
+      ShapeType::kPolygon,
+      {0.0, 0.0, 3.0, 0.0, 3.0, 1.0, 2.0, 1.0, 2.0, 0.5, 1.0, 0.5, 1.0, 1.0, 0.0, 1.0}};
+  const Outline outline(notched.Placed().shape);
+  const Body box = Tile(1.5, 1.0, 1.0, 0.5);
+  const ShapeSeams of_box = SeamsOf(box, nullptr, notched, &outline);
+  int hidden = 0;
+  for (int i = 0; i < 4; ++i) {
+    hidden += of_box.edges[i].IsHidden() ? 1 : 0;
+    EXPECT_FALSE(of_box.vertices[i].is_open) << i;
+  }
+  EXPECT_EQ(hidden, 3);
+  const ShapeSeams of_notched = SeamsOf(notched, &outline, box, nullptr);
+  for (int run = 0; run < outline.num_runs(); ++run) {
+    const Vector2<double> middle =
+        outline.run(run).start + 0.5 * outline.run(run).length * outline.run(run).tangent;
+    const bool covered = middle.x() >= 1.0 && middle.x() <= 2.0 && middle.y() > 0.4;
+    EXPECT_EQ(of_notched.edges[run].IsHidden(), covered) << run;
   }
 }
 

@@ -63,8 +63,10 @@ int FindFeaturesAtSeams(const Model<double>& model, int a, const Pose<double>& p
       return FindPlaneFeature(outline, outline_a != nullptr ? run_a : run_b, other, pose_a, pose_b,
                               side, max_gap, features);
     }
+    const ShapeSeams* const seams =
+        outline_a != nullptr ? model.SeamsOf(b, parts.b) : model.SeamsOf(a, parts.a);
     return FindOutlineFeatures(outline, outline_a != nullptr ? run_a : run_b, shape_a, pose_a,
-                               shape_b, pose_b, side, max_gap, features);
+                               shape_b, pose_b, side, seams, max_gap, features);
   }
   if (const ShapeSeams* seams = model.SeamsOf(a, parts.a); seams != nullptr) {
     return FindContactFeaturesAtSeams(shape_a, pose_a, shape_b, pose_b, *seams, SeamSide::kFirst,

@@ -13,8 +13,10 @@
 
 namespace tangible {
 
-/// The box, in a body's frame, of a box of the world that is grown by `margin`.
+/// The box, in a body's frame, of a box of the world that is grown by `margin`. That of an open
+/// polyline has no end.
 inline Aabb BoxInFrame(const Pose<double>& frame, const Aabb& box, double margin) {
+  if (std::isinf(box.max_x - box.min_x) || std::isinf(box.max_y - box.min_y)) return box;
   const Vector2<double> centre(0.5 * (box.min_x + box.max_x), 0.5 * (box.min_y + box.max_y));
   const double half_x = 0.5 * (box.max_x - box.min_x);
   const double half_y = 0.5 * (box.max_y - box.min_y);

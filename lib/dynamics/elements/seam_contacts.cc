@@ -11,10 +11,10 @@ bool AreOfOneSeam(const Model<double>& model, const ActiveContact& x,
   if (!x.IsOfShapes() || !y.IsOfShapes() || (x.a == y.a && x.b == y.b)) {
     return false;
   }
-  const bool first_of_x = model.SeamsOf(x.a, x.feature.part_a) != nullptr;
-  const bool first_of_y = model.SeamsOf(y.a, y.feature.part_a) != nullptr;
-  const bool has_seams = (first_of_x || model.SeamsOf(x.b, x.feature.part_b) != nullptr) &&
-                         (first_of_y || model.SeamsOf(y.b, y.feature.part_b) != nullptr);
+  const bool first_of_x = model.HasSeams(x.a, x.feature.part_a);
+  const bool first_of_y = model.HasSeams(y.a, y.feature.part_a);
+  const bool has_seams = (first_of_x || model.HasSeams(x.b, x.feature.part_b)) &&
+                         (first_of_y || model.HasSeams(y.b, y.feature.part_b));
   const double sign = first_of_x == first_of_y ? 1.0 : -1.0;
   return has_seams && (first_of_x ? x.b : x.a) == (first_of_y ? y.b : y.a) &&
          (of_x.point - of_y.point).norm() <= 2.0 * kFlushStep &&

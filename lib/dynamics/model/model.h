@@ -255,6 +255,12 @@ struct Model {
   const Outline* OutlineOf(int body, int part) const {
     return structure->bodies[body].IsContactPoint(part) ? nullptr : OutlineOf(body);
   }
+  /// Whether neighbours leave less of a part of a body than its shape: SeamsOf, or the seams of an
+  /// outline.
+  bool HasSeams(int body, int part) const {
+    const Outline* const outline = OutlineOf(body, part);
+    return outline != nullptr ? outline->HasSeams() : SeamsOf(body, part) != nullptr;
+  }
   /// The curve of a body that is a spline, or nullptr; of a part that is not a contact point.
   const Curve* CurveOf(int body, int part = 0) const {
     return seams == nullptr || part != 0 || curve_of[body] < 0 ? nullptr

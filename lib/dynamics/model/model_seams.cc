@@ -70,48 +70,56 @@ void FindModelSeams(const State<double>& state, Model<double>* model) {
   const ModelStructure& structure = *model->structure;
   std::vector<bool> may_have_seams(structure.bodies.size(), false);
   int count = 0;
+  ModelSeams seams;
+  std::vector<int> seams_of(structure.bodies.size(), -1);
+  std::vector<int> outline_of(structure.bodies.size(), -1);
+  std::vector<int> curve_of(structure.bodies.size(), -1);
   for (int body = 0; body < structure.num_bodies(); ++body) {
     const BodyIndex& index = structure.bodies[body];
-    if (index.shape == ShapeType::kNone || index.shape == ShapeType::kSpline ||
-        HasOutline(*model, body)) {
+    if (index.shape == ShapeType::kNone) continue;
+    if (index.shape == ShapeType::kSpline) {
+      curve_of[body] = static_cast<int>(seams.curves.size());
+      seams.curves.emplace_back(model->Shape(body));
       continue;
+    }
+    if (HasOutline(*model, body)) {
+      outline_of[body] = static_cast<int>(seams.outlines.size());
+      seams.outlines.emplace_back(model->Shape(body));
     }
     if (index.block < 0 && MayHaveSeams(model->Shape(body))) {
       may_have_seams[body] = true;
       ++count;
     }
   }
-  ModelSeams seams;
-  std::vector<int> seams_of(structure.bodies.size(), -1);
-  std::vector<int> outline_of(structure.bodies.size(), -1);
-  std::vector<int> curve_of(structure.bodies.size(), -1);
-  for (int body = 0; body < structure.num_bodies(); ++body) {
-    if (structure.bodies[body].shape == ShapeType::kSpline) {
-      curve_of[body] = static_cast<int>(seams.curves.size());
-      seams.curves.emplace_back(model->Shape(body));
-    }
-    if (!HasOutline(*model, body)) continue;
-    outline_of[body] = static_cast<int>(seams.outlines.size());
-    seams.outlines.emplace_back(model->Shape(body));
-  }
   if (count < 2 && seams.outlines.empty() && seams.curves.empty()) {
     return;
   }
   std::vector<std::vector<PlacedShape>> neighbours(structure.bodies.size());
   const auto placed = [&](int body) -> PlacedShape {
-    return {model->Shape(body), state.PoseOf(body)};
+    return {model->Shape(body), state.PoseOf(body),
+            outline_of[body] < 0 ? nullptr : &seams.outlines[outline_of[body]]};
   };
   for (const auto& [a, b] : FindNeighbours(*model, state, may_have_seams)) {
     neighbours[a].push_back(placed(b));
     neighbours[b].push_back(placed(a));
   }
+  // What an outline leaves of its neighbours does not depend on what they leave of it.
+  std::vector<std::pair<int, ShapeSeams>> of_outlines;
   for (int body = 0; body < structure.num_bodies(); ++body) {
     ShapeSeams own;
-    if (!neighbours[body].empty() && structure.bodies[body].shape != ShapeType::kHalfPlane &&
-        FindSeams(placed(body), neighbours[body], &own, &seams.steps)) {
-      seams_of[body] = static_cast<int>(seams.shapes.size());
-      seams.shapes.push_back(std::move(own));
+    if (neighbours[body].empty() || structure.bodies[body].shape == ShapeType::kHalfPlane ||
+        !FindSeams(placed(body), neighbours[body], &own, &seams.steps)) {
+      continue;
     }
+    if (outline_of[body] >= 0) {
+      of_outlines.emplace_back(outline_of[body], std::move(own));
+      continue;
+    }
+    seams_of[body] = static_cast<int>(seams.shapes.size());
+    seams.shapes.push_back(std::move(own));
+  }
+  for (auto& [outline, own] : of_outlines) {
+    seams.outlines[outline].SetSeams(std::move(own));
   }
   if (!seams.shapes.empty() || !seams.outlines.empty() || !seams.curves.empty()) {
     model->seams = std::make_shared<const ModelSeams>(std::move(seams));

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tangible/dynamics/elements/seam_contacts.h"
+
 namespace tangible {
 namespace {
 
@@ -94,23 +96,30 @@ class GrazeFinder {
     return 2.0 * fastest;
   }
 
-  // Whether the touch is that of a feature at the point where another one of the same shapes has
-  // touched until now, as the corner at the end of a face: nothing new touches, and its speed is 0.
+  // Whether the touch is that of a feature at the point where another one of the same shapes, or
+  // of the neighbour at a flush seam, has touched until now, as the corner at the end of a face:
+  // nothing new touches, and its speed is 0.
   // Its gap is within the tolerance of the touch where the points of both are √(2 size tolerance)
   // apart along a curve.
   bool TakesOver(const Segment& segment) const {
     const ActiveContact& next = segment.event_contact;
     const double same = std::sqrt(2.0 * search_.lengths().Size(next.a, next.b) *
                                   search_.TouchTolerance(model_, segment.after, next));
-    const auto point = [&](const ActiveContact& contact) {
+    const auto geometry_of = [&](const ActiveContact& contact) {
       ContactRows<double> rows;
       EvaluateContactRows(model_, segment.after, contact, &rows);
-      return rows.geometry.point;
+      return rows.geometry;
     };
-    return std::any_of(
-        segment.contacts.begin(), segment.contacts.end(), [&](const ActiveContact& closed) {
-          return next.IsOfTheSameShapes(closed) && (point(closed) - point(next)).norm() <= same;
-        });
+    if (!next.IsOfShapes()) return false;
+    const ContactGeometry<double> of_next = geometry_of(next);
+    return std::any_of(segment.contacts.begin(), segment.contacts.end(),
+                       [&](const ActiveContact& closed) {
+                         if (!closed.IsOfShapes()) return false;
+                         const ContactGeometry<double> of_closed = geometry_of(closed);
+                         return (next.IsOfTheSameShapes(closed) &&
+                                 (of_closed.point - of_next.point).norm() <= same) ||
+                                AreOfOneSeam(model_, closed, of_closed, next, of_next);
+                       });
   }
 
   void AddTouch(const Segment& segment) {

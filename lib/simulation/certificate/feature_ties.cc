@@ -23,7 +23,7 @@ class NextDoor {
       : model_(model),
         state_(state),
         contact_(contact),
-        tiled_is_first_(model.SeamsOf(contact.a, contact.feature.part_a) != nullptr),
+        tiled_is_first_(model.HasSeams(contact.a, contact.feature.part_a)),
         tiled_(tiled_is_first_ ? contact.a : contact.b),
         moving_(tiled_is_first_ ? contact.b : contact.a),
         first_(first),
@@ -33,7 +33,7 @@ class NextDoor {
   bool HasContact(double near) const {
     const ModelStructure& s = *model_.structure;
     const int part = tiled_is_first_ ? contact_.feature.part_a : contact_.feature.part_b;
-    if (model_.SeamsOf(tiled_, part) == nullptr) {
+    if (!model_.HasSeams(tiled_, part)) {
       return false;
     }
     for (int body = 0; body < s.num_bodies(); ++body) {
@@ -72,10 +72,28 @@ class NextDoor {
     const Pose<double>& pose_a = neighbour_is_first ? neighbour : mover;
     const Pose<double>& pose_b = neighbour_is_first ? mover : neighbour;
     const int part = tiled_is_first_ ? contact_.feature.part_b : contact_.feature.part_a;
-    const PartPair parts = neighbour_is_first ? PartPair{0, part} : PartPair{part, 0};
-    ContactFeature features[2];
-    const int count =
-        FindFeatures(model_, other.a, pose_a, other.b, pose_b, parts, kInfinity, features);
+    const auto has_contact = [&](int of_neighbour) {
+      const PartPair parts =
+          neighbour_is_first ? PartPair{of_neighbour, part} : PartPair{part, of_neighbour};
+      ContactFeature features[2];
+      const int count =
+          FindFeatures(model_, other.a, pose_a, other.b, pose_b, parts, kInfinity, features);
+      return IsAmong(other, pose_a, pose_b, neighbour_is_first, features, count, near);
+    };
+    const Outline* const outline = model_.OutlineOf(body);
+    if (outline == nullptr) return has_contact(0);
+    const Vector2<double> at = neighbour.Inverse(from_.point);
+    bool found = false;
+    outline->ForEachRun({at.x() - near, at.y() - near, at.x() + near, at.y() + near}, [&](int run) {
+      found = found || has_contact(model_.structure->bodies[body].PartOfRun(run));
+    });
+    return found;
+  }
+
+  // Whether one of the features is a contact at the same place.
+  bool IsAmong(ActiveContact other, const Pose<double>& pose_a, const Pose<double>& pose_b,
+               bool neighbour_is_first, const ContactFeature* features, int count,
+               double near) const {
     const double sign = neighbour_is_first == tiled_is_first_ ? 1.0 : -1.0;
     return std::any_of(features, features + count, [&](const ContactFeature& feature) {
       other.feature = feature;

@@ -265,8 +265,8 @@ bool EventSearch::PairSearch::RestsAtSeams() const {
   const int moving = first ? b_ : a_;
   return std::any_of(segment_.contacts.begin(), segment_.contacts.end(), [&](const auto& contact) {
     return contact.IsOfShapes() &&
-           ((contact.a == moving && model_.SeamsOf(contact.b, 0) != nullptr) ||
-            (contact.b == moving && model_.SeamsOf(contact.a, 0) != nullptr));
+           ((contact.a == moving && model_.HasSeams(contact.b, contact.feature.part_b)) ||
+            (contact.b == moving && model_.HasSeams(contact.a, contact.feature.part_a)));
   });
 }
 
@@ -323,6 +323,10 @@ double EventSearch::PairSearch::HiddenRunGap(const State<double>& state, ActiveC
   const Pose<double> pose_b = state.PoseOf(b_);
   const int run_a = model_.structure->bodies[a_].RunOfPart(parts_.a);
   const int run_b = model_.structure->bodies[b_].RunOfPart(parts_.b);
+  if ((outline_a_ != nullptr && outline_a_->IsHidden(run_a)) ||
+      (outline_b_ != nullptr && outline_b_->IsHidden(run_b))) {
+    return kInfinity;
+  }
   double gap = kInfinity;
   if (outline_a_ != nullptr && outline_b_ != nullptr) {
     gap = DistanceOfRuns({*outline_a_, run_a, pose_a}, {*outline_b_, run_b, pose_b}, &feature.a,

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// A floor of two pieces of which one or both are polylines or concave polygons: what passes their
+// seam moves as on one plane.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "../../support/gradients.h"
+#include "../../support/scenes.h"
+#include "tangible/simulation/gradient/gradient.h"
+
+namespace tangible {
+namespace {
+
+struct Piece {
+  const char* name;
+  const char* shape;
+  double x, y;  // m, of its position
+};
+
+// From −2 m to 0 and from 0 to 3 m, with their upper faces at y = 1 m.
+const std::vector<Piece> kLeft = {
+    {"box", R"({"box": {"size": [2, 1]}})", -1.0, 0.5},
+    {"polygon", R"({"polygon": {"vertices": [[-2, 0], [0, 0], [0, 1], [-2, 1], [-1.8, 0.5]]}})",
+     0.0, 0.0},
+    {"closed", R"({"polyline": {"points": [[-2, 0], [-2, 1], [0, 1], [0, 0]], "solid": "right"}})",
+     0.0, 0.0},
+    {"open", R"({"polyline": {"points": [[-2, 1], [0, 1]], "solid": "right"}})", 0.0, 0.0}};
+const std::vector<Piece> kRight = {
+    {"box", R"({"box": {"size": [3, 1]}})", 1.5, 0.5},
+    {"polygon",
+     R"({"polygon": {"vertices": [[0, 0], [3, 0], [3, 1], [2.8, 0.6], [2.6, 1], [0, 1]]}})", 0.0,
+     0.0},
+    {"closed", R"({"polyline": {"points": [[0, 0], [0, 1], [3, 1], [3, 0]], "solid": "right"}})",
+     0.0, 0.0},
+    {"open", R"({"polyline": {"points": [[0, 1], [3, 1]], "solid": "right"}})", 0.0, 0.0}};
+const std::vector<const char*> kShapes = {
+    R"({"box": {"size": [0.2, 0.2]}})", R"({"circle": {"radius": 0.1}})",
+    R"({"polygon": {"vertices": [[-0.1, -0.1], [0.1, -0.1], [0.1, 0.1], [0, 0.02], [-0.1, 0.1]]}})"};
+
+struct Pass {
+  const char* shape;
+  double way = 1.0;  // to the right; −1: to the left
+  double friction = 0.0;
+  double tilt = 0.0;  // rad, of everything
+  double dt = 0.01;
+  Stepping stepping = Stepping::kEvent;
+};
+
+// Everything is turned about the origin by the tilt; `left` null: one half-plane.
+Scene SceneOf(const Pass& pass, const Piece* left, const Piece* right, double higher = 0.0) {
+  Scene scene = test_scenes::SceneOf(
+      std::string(
+          R"({"gravity": [0, -10], "bodies": [{"name": "b", "mass": 1, "inertia": 0.01, "shape": )") +
+      pass.shape + R"(, "position": [0, 1.1], "restitution": 0.5}, )" +
+      (left == nullptr
+           ? R"({"name": "floor", "static": true,
+                 "shape": {"half_plane": {"normal": [0, 1], "offset": 1}}})"
+           : std::string(R"({"name": "left", "static": true, "restitution": 0.5, "shape": )") +
+                 left->shape + R"(}, {"name": "right", "static": true, "restitution": 0.5,
+                                      "shape": )" +
+                 right->shape + "}") +
+      R"(], "simulation": {"duration": 0.9}})");
+  const Rotation<double> turn(pass.tilt);
+  scene.gravity = turn * scene.gravity;
+  scene.simulation.dt = pass.dt;
+  scene.simulation.stepping = pass.stepping;
+  for (BasicBody<double>& body : scene.bodies) {
+    if (body.name == "b") {
+      body.position.x() = -0.5 * pass.way;
+      body.velocity = turn * Vector2<double>(1.3 * pass.way, 0.0);
+    } else if (left != nullptr) {
+      const Piece& piece = body.name == "left" ? *left : *right;
+      body.position = {piece.x, piece.y + (body.name == "right" ? higher : 0.0)};
+    }
+    body.position = turn * body.position;
+    body.angle = pass.tilt;
+    body.friction = pass.friction;
+  }
+  return scene;
+}
+
+GradientResult Derivative(const Scene& scene) {
+  return FinalStateJacobian(scene, testing::Resolve(scene, {"bodies/b/velocity/x"}), {});
+}
+
+void ExpectSame(const GradientResult& seam, const GradientResult& plane, const std::string& what) {
+  ASSERT_TRUE(seam.done) << what << ": " << seam.message;
+  EXPECT_NEAR((seam.values - plane.values).cwiseAbs().maxCoeff(), 0.0, 1e-9) << what;
+  EXPECT_NEAR((seam.jacobian - plane.jacobian).cwiseAbs().maxCoeff(), 0.0, 1e-8) << what;
+  // Of a concave polygon the corner that passes a seam is another body's contact.
+  if (what.find("[0, 0.02]") == std::string::npos) {
+    EXPECT_EQ(seam.certificate.verdict, plane.certificate.verdict) << what;
+  }
+}
+
+TEST(OutlineSeamsTest, WhatPassesFlushPiecesMovesAsOnOnePlane) {
+  for (const char* shape : kShapes) {
+    for (const Stepping stepping : {Stepping::kEvent, Stepping::kFixed}) {
+      for (const double way : {1.0, -1.0}) {
+        for (const double friction : {0.0, 0.1}) {
+          Pass pass{shape, way, friction, 0.0, friction > 0.0 ? 0.1 : 0.01, stepping};
+          const GradientResult plane = Derivative(SceneOf(pass, nullptr, nullptr));
+          for (const Piece& left : kLeft) {
+            for (const Piece& right : kRight) {
+              ExpectSame(Derivative(SceneOf(pass, &left, &right)), plane,
+                         std::string(left.name) + " " + right.name + " " + shape + ", " +
+                             std::to_string(way) + ", friction " + std::to_string(friction) +
+                             (stepping == Stepping::kEvent ? ", events" : ", fixed"));
+            }
+          }
+        }
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace tangible
