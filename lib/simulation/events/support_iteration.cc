@@ -29,6 +29,7 @@ void SupportIteration::Start(const Model<double>& model, double h,
   h_ = h;
   iterations_ = 0;
   residual_ = HUGE_VAL;
+  is_about_ = false;
   before->supports.resize(s.supports.size());
   residuals_.resize(s.supports.size());
   turns_.assign(s.supports.size(), 0);
@@ -127,6 +128,32 @@ double SupportIteration::ResidualOf(const SupportState& at, const double mass[3]
   return residual;
 }
 
+// How far the velocities of what slides are from those about which its friction is linearised, as
+// a share of them.
+double SupportIteration::AwayFrom(const SupportState& at, const double mass[3],
+                                  const double twist[3]) const {
+  if (at.holds == SupportState::kBody || !(friction_.limit() > 0.0)) return 0.0;
+  const double slow = kStandingPoint * friction_.limit() / mass[0];
+  if (friction_.is_disc()) {
+    const double arm = friction_.arm();
+    const double speed = std::hypot(twist[0], twist[1], arm * twist[2]);
+    const double away =
+        std::hypot(twist[0] - at.twist[0], twist[1] - at.twist[1], arm * (twist[2] - at.twist[2]));
+    return speed > slow ? away / speed : 0.0;
+  }
+  double most = 0.0;
+  for (size_t i = 0; i < friction_.points().size(); ++i) {
+    if (static_cast<int>(i) == at.holds) continue;
+    double about[2], velocity[2];
+    friction_.points()[i].VelocityAt(at.twist.data(), about);
+    friction_.points()[i].VelocityAt(twist, velocity);
+    const double speed = std::hypot(velocity[0], velocity[1]);
+    if (!(speed > slow)) continue;
+    most = std::max(most, std::hypot(velocity[0] - about[0], velocity[1] - about[1]) / speed);
+  }
+  return most;
+}
+
 void SupportIteration::Linearise(const double mass[3], const double twist[3], const double* held,
                                  int* turns, SupportState* at) const {
   // Held as a whole after so many turns, and again after as many.
@@ -202,13 +229,24 @@ bool SupportIteration::Accept(const Model<double>& model, const ContactProblem<d
     }
   };
   residual_ = 0.0;
+  double away = 0.0;
   visit([&](size_t k, const double* mass, const double* twist, const double* held) {
+    away = std::max(away, AwayFrom(before->supports[k], mass, twist));
     residuals_[k] = ResidualOf(before->supports[k], mass, twist, held);
     if (residuals_[k] < residual_) return;
     residual_ = residuals_[k];
     worst_body_ = s.supports[k].body;
   });
-  if (residual_ <= kSupportSettled) return true;
+  if (residual_ <= kSupportSettled && (away <= kSupportAbout || is_about_)) return true;
+  if (residual_ <= kSupportSettled) {
+    is_about_ = true;
+    ++iterations_;
+    visit([&](size_t k, const double*, const double* twist, const double*) {
+      SupportState& at = before->supports[k];
+      if (at.holds != SupportState::kBody) std::copy_n(twist, 3, at.twist.begin());
+    });
+    return false;
+  }
   if (residual_ <= s.settings.lcp_tolerance && residual_ > 0.5 * last) return true;
   ++iterations_;
   visit([&](size_t k, const double* mass, const double* twist, const double* held) {

@@ -30,8 +30,10 @@ class SupportIteration {
   /// rest, whose accelerations stand for the new twists.
   void Start(const Model<double>& model, double h, const ContactProblem<double>& problem,
              const std::vector<char>& are_at_rest, State<double>* before);
-  /// Whether the friction of a solved step is that of its new twists, to the tolerance of the LCP;
-  /// if it is not, linearises it anew in `before`, which is the state of the record.
+  /// Whether the friction of a solved step is that of its new twists, to the tolerance of the LCP,
+  /// and linearised about them; if it is not, linearises it anew in `before`, which is the state of
+  /// the record. Where the friction keeps its direction it is right at once, but its derivative
+  /// across that direction, −μ N / |v|, is that of the speed about which it is linearised.
   bool Accept(const Model<double>& model, const ContactProblem<double>& problem,
               const ContactSolution<double>& solution, State<double>* before);
 
@@ -52,12 +54,14 @@ class SupportIteration {
                     const double* held) const;
   void Linearise(const double mass[3], const double twist[3], const double* held, int* turns,
                  SupportState* at) const;
+  double AwayFrom(const SupportState& at, const double mass[3], const double twist[3]) const;
   void ImpulseOf(const SupportState& at, const double twist[3], const double* held,
                  double impulse[3]) const;
 
   double h_ = 0.0;
   int iterations_ = 0;
   double residual_ = 0.0;
+  bool is_about_ = false;  ///< linearised once more since it settled
   int worst_body_ = -1;
   SupportFriction friction_;
   std::vector<double> residuals_;

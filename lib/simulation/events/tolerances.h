@@ -197,8 +197,11 @@ inline constexpr double kLocatedDerivative = 1e-12;
 inline constexpr double kDegenerateTolerance = 1e-10;
 
 /// Of μ N: friction of a support that differs by less from that of the new twist has settled; it is
-/// some hundred roundings, so that derivatives at the linearised one are right to the same.
+/// some hundred roundings.
 inline constexpr double kSupportSettled = 1e-13;
+/// Of the velocity of a point on a support: its friction counts as linearised about the new twist
+/// where the two differ by less, because derivatives are those of the linearised friction.
+inline constexpr double kSupportAbout = 1e-11;
 /// Of the speed that its friction takes from a body in a step: a point of a support that is slower
 /// has no direction, and any friction within its limit is that of a point at rest.
 inline constexpr double kStandingPoint = 1e-12;

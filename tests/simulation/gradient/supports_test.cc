@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "../../support/gradients.h"
@@ -238,6 +239,37 @@ TEST(SupportsTest, AgainstAWall) {
     const GradientResult result = Jacobian(scene, {"gravity/y"}, GradientMethod::kTangent);
     EXPECT_NEAR(result.values[1], 0.1, 1e-12) << support;
     EXPECT_NEAR(result.values[4], 0.0, 1e-12) << support;
+  }
+}
+
+// What brakes or pushes a puck along its direction leaves that of its friction as it is; across it
+// the friction is that of the new speed, m v' = m v - h mu N v' / |v'|. Two pucks that a rod ties,
+// and one that meets a wall head on.
+TEST(SupportsTest, AcrossAStraightMotionFrictionIsThatOfTheNewSpeed) {
+  const Scene tied = SceneOf(R"({"gravity": [0, 0], "bodies": [
+      {"name": "b", "mass": 1, "inertia": 1, "position": [0, 0], "velocity": [1, 0],
+       "support": {"friction": 1, "load": 1}},
+      {"name": "a", "mass": 1, "inertia": 1, "position": [2, 0], "velocity": [1, 0],
+       "support": {"friction": 0.5, "load": 1}}],
+      "joints": [{"name": "rod", "type": "distance", "bodies": ["b", "a"],
+                  "anchors": [[0, 0], [2, 0]]}],
+      "simulation": {"dt": 0.1, "duration": 0.1}})");
+  const Scene head_on = SceneOf(R"({"gravity": [0, 0], "bodies": [
+      {"name": "b", "mass": 1, "shape": {"circle": {"radius": 0.25}}, "position": [0, 0],
+       "velocity": [1, 0], "restitution": 0.5, "friction": 0,
+       "support": {"friction": 1, "load": 1}},
+      {"name": "wall", "static": true, "restitution": 0.5, "friction": 0,
+       "shape": {"half_plane": {"normal": [-1, 0], "offset": -0.25}}}],
+      "simulation": {"dt": 0.1, "duration": 0.1}})");
+  const std::vector<std::string> paths = {"bodies/b/velocity/y"};
+  for (const auto& [scene, speed] : {std::pair(tied, 0.925), std::pair(head_on, 0.5)}) {
+    const GradientResult result = Jacobian(scene, paths, GradientMethod::kAdjoint);
+    ASSERT_TRUE(result.done) << result.message;
+    Eigen::Index of_b = 0;
+    while (result.outputs[static_cast<size_t>(of_b)] != "b/vx") ++of_b;
+    EXPECT_NEAR(std::abs(result.values[of_b]), speed, 1e-12);
+    EXPECT_NEAR(result.jacobian(of_b + 1, 0), 1.0 / (1.0 + 0.1 / speed), 1e-10);
+    ExpectOthersAgree(scene, paths, result);
   }
 }
 
