@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "tangible/lcp/system/contact_system.h"
 #include "tangible/lcp/system/tolerances.h"
@@ -16,6 +17,14 @@ namespace {
 // every residual would seem small.
 constexpr double kMostPushed = 1e6;
 
+// x / scale, with 0/0 = 0. Numbers next to the smallest ones have no digits to be compared: what
+// decays by its rounding in each step comes there.
+double ShareOf(double x, double scale) {
+  constexpr double kHasDigits =
+      std::numeric_limits<double>::min() / std::numeric_limits<double>::epsilon();
+  return scale > kHasDigits ? x / scale : 0.0;
+}
+
 // The largest component of a row for a body, with rotation taken at the body's lever.
 double RowSize(const RowPart<double>& row, double lever) {
   return std::max({std::abs(row[0]), std::abs(row[1]), std::abs(row[2]) / lever});
@@ -28,12 +37,10 @@ double RowSpeed(const ContactScales& scales, int a, const RowPart<double>& row_a
          (b >= 0 ? scales.speed[b] * RowSize(row_b, scales.lever[b]) : 0.0);
 }
 
-// |min(z/ζ, s/σ)|, with 0/0 = 0. A scale that overflows would make every residual seem small.
+// |min(z/ζ, s/σ)|. A scale that overflows would make every residual seem small.
 double RowResidual(double z, double zeta, double s, double sigma) {
   if (!std::isfinite(sigma)) return HUGE_VAL;
-  const double scaled_z = zeta > 0.0 ? z / zeta : 0.0;
-  const double scaled_s = sigma > 0.0 ? s / sigma : 0.0;
-  return std::abs(std::min(scaled_z, scaled_s));
+  return std::abs(std::min(ShareOf(z, zeta), ShareOf(s, sigma)));
 }
 
 struct ResidualScratch {
@@ -101,7 +108,7 @@ double MomentumResidual(const ContactProblem<double>& problem,
     const double scale = std::max({of[0], of[1], of[2] / lever});
     // Terms that overflow would make every residual seem small.
     if (!std::isfinite(scale) || std::isnan(x[0] + x[1] + x[2])) return HUGE_VAL;
-    worst = std::max(worst, scale > 0.0 ? missing / scale : 0.0);
+    worst = std::max(worst, ShareOf(missing, scale));
   }
   return worst;
 }
@@ -116,7 +123,7 @@ double JointResidual(const ContactProblem<double>& problem, const ContactScales&
                      RowSpeed(scales, joint.a, joint.row_a[k], joint.b, joint.row_b[k]);
       if (joint.c >= 0) scale += RowSpeed(scales, joint.c, joint.row_c, joint.d, joint.row_d);
       if (!std::isfinite(scale)) return HUGE_VAL;
-      worst = std::max(worst, scale > 0.0 ? std::abs(value - joint.rhs[k]) / scale : 0.0);
+      worst = std::max(worst, ShareOf(std::abs(value - joint.rhs[k]), scale));
     }
   }
   return worst;

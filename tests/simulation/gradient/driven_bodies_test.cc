@@ -414,5 +414,23 @@ TEST(DrivenBodiesTest, FormulasAgreeWithJets) {
   }
 }
 
+// What is welded to a path that has stopped rests, while its speeds decay by their rounding at each
+// step until they are no numbers with digits any more.
+TEST(DrivenBodiesTest, WhatHangsOnAPathThatStopsComesToRest) {
+  for (const double dt : {0.01, 0.05}) {
+    const Finished run = DrivenRun(SceneOf(
+        R"({"gravity": [0, 0], "bodies": [
+        {"name": "b", "mass": 1, "shape": {"circle": {"radius": 0.5}}, "position": [-1, 2]},
+        {"name": "k", "kinematic": true, "shape": {"circle": {"radius": 0.5}}, "position": [0, 0],
+         "motion": {)" +
+        Series({0.0, 0.5}, {{"x", [](double t) { return -1.0 + t; }}}) +
+        R"(, "interpolation": "linear"}}],
+        "joints": [{"name": "j", "type": "weld", "bodies": ["b", "k"], "anchor": [-1, 0]}])" +
+        DrivenFor("fixed", dt, 3.0)));
+    EXPECT_NEAR(run.final.pose[0], -0.5, 1e-9);
+    EXPECT_NEAR(run.final.pose[1], 2.0, 1e-9);
+  }
+}
+
 }  // namespace
 }  // namespace tangible
