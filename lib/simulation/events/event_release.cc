@@ -271,7 +271,22 @@ bool EventStepper::Releases(const Model<double>& model, const Segment& segment) 
   } else if (search_.ends_at_start() && !segment.release.empty()) {
     ReleaseTogether(segment);
   } else if (search_.ends_at_start()) {
-    const bool opens = segment.event == EventKind::kLiftOff;
+    // What slides backwards when it is let go, and holds with more than its limit, jams: it opens,
+    // or is held where it would close again.
+    const ActiveContact& event = segment.event_contact;
+    const auto has_event = [&](const std::vector<ActiveContact>& contacts) {
+      return std::any_of(contacts.begin(), contacts.end(),
+                         [&](const ActiveContact& one) { return one.SameAs(event); });
+    };
+    const bool jams = segment.event == EventKind::kSlipBegins && has_event(resting_);
+    if (jams && (event.IsPureFriction() || has_event(jammed_))) {
+      released_.clear();
+      search_.KeepStarts(true);
+      --record_.num_parts;
+      return true;
+    }
+    if (jams) jammed_.push_back(event);
+    const bool opens = jams || segment.event == EventKind::kLiftOff;
     for (const ActiveContact& contact : segment.contacts) {
       if (opens ? contact.SameAs(segment.event_contact)
                 : contact.IsBetweenTheSame(segment.event_contact)) {

@@ -699,6 +699,7 @@ StepReport EventStepper::Advance(const Model<double>& model, double t, double h,
   guess_.located = 0;
   released_.clear();
   resting_.clear();
+  jammed_.clear();
   limited_ = false;
   counts_.Clear();
   shortened_.Clear();
@@ -742,6 +743,7 @@ StepReport EventStepper::Advance(const Model<double>& model, double t, double h,
     tries.held = false;
     tries.unsolved.clear();
     resting_.clear();
+    jammed_.clear();
     guess_.located += IsLocated(segment.event) ? 1 : 0;
     outcome.stopped = at_event == AtEvent::kStopAtSecond && guess_.located > 1;
     if (outcome.stopped) break;

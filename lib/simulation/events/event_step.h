@@ -296,6 +296,8 @@ class EventStepper {
   std::vector<EndingSlip> released_;
   /// Contacts at rest that would slide backwards in the next motion as soon as they slide.
   std::vector<ActiveContact> resting_;
+  /// Of these, those that then held with more than their limit, and have been opened.
+  std::vector<ActiveContact> jammed_;
 };
 
 }  // namespace tangible

@@ -318,5 +318,38 @@ TEST(PilesByEventsTest, ABodyWithLimbsComesToRestOnItsLimits) {
   EXPECT_LE(run.deepest, 1e-9);
 }
 
+// A polygon of 14 kg that is pressed onto a disc of 1 kg which rolls along a floor with friction of
+// 1. Their contact holds up to its limit; beyond it can neither slide, as its friction would grow
+// with its force, nor hold, and opens: the heavy body goes on turning, and the disc rolls away.
+TEST(PilesByEventsTest, AContactThatJamsAtItsLimitOpens) {
+  const std::string bodies = R"({"bodies": [
+      {"name": "floor", "static": true, "friction": 1,
+       "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}},
+      {"name": "heavy", "mass": 14.444946659306428, "friction": 1, "shape": {"polygon": {"vertices": [
+        [-0.037150642539859315, 0.06720379052277352], [-0.07539478279318362, -0.014565247314134087],
+        [-0.009445895800743905, -0.0762056084174565], [0.06955689813413399, -0.03253240882121912],
+        [0.052434422999652855, 0.05609947403003617]]}},
+       "position": [0.2585182029363993, 0.09362963277380072], "angle": -2.223773397145848,
+       "velocity": [-0.4681160564646864, -0.6799529532615431],
+       "angular_velocity": 4.55537884808676},
+      {"name": "light", "mass": 0.9470012022013743, "friction": 1,
+       "shape": {"circle": {"radius": 0.06760968987797082}},
+       "position": [0.4004604671741085, 0.06760968987797082], "angle": -0.25073440138317216,
+       "velocity": [-0.3421571186392483, 0], "angular_velocity": 5.060770419991719}],
+      "simulation": {"stepping": "event", "duration": 0.05, "dt": )";
+  for (const char* dt : {"0.01", "0.001", "0.0003"}) {
+    Model<double> model;
+    State<double> state, final;
+    BuildModel(test_scenes::SceneOf(bodies + dt + "}}"), &model, &state);
+    const auto energy = [&](const State<double>& at) {
+      return KineticEnergy(model, at) + PotentialEnergy(model, at);
+    };
+    const RolloutReport report = Rollout(model, state, {}, &final);
+    ASSERT_EQ(report.status, StepStatus::kDone) << dt << ": " << report.message;
+    EXPECT_LE(energy(final), energy(state) + 1e-9) << dt;
+    EXPECT_LE(report.events, 100) << dt;
+  }
+}
+
 }  // namespace
 }  // namespace tangible
