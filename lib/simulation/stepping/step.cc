@@ -413,9 +413,17 @@ ContactSolverReport Stepper::SolveWithContacts(const Model<double>& model,
       // the solution.
       CarryGuess(wider_contacts_, narrow_solution_, Guess::kSameStep);
     }
+    // That rebounds have no solution is dear to find out: they are given up before the solver's last
+    // resorts, which come after all of them.
+    const auto rebounds = [&](const ActiveContact& contact) {
+      return contact.law == ContactLaw::kRestitution;
+    };
+    bool waits = std::any_of(r.contacts.begin(), r.contacts.end(), rebounds);
     const auto solve = [&] {
       const ContactSolverReport earlier = solved;
-      solved = SolveContacts(SolverOptionsOf(structure.settings), &report->islands);
+      ContactSolverOptions options = SolverOptionsOf(structure.settings);
+      options.last_resort = !waits;
+      solved = SolveContacts(options, &report->islands);
       solved.factorisations += earlier.factorisations;
       solved.iterations += earlier.iterations;
       report->solver.Add(solved.fallbacks);
@@ -427,6 +435,11 @@ ContactSolverReport Stepper::SolveWithContacts(const Model<double>& model,
       ++report->given_up.rebounds_given_up;
       AssembleContacts(model, state, h, r.contacts, r.friction, r.restitution, &scratch_,
                        &r.problem);
+      CarryGuess(last_contacts_, last_solution_, Guess::kLastStep);
+      solve();
+    }
+    if (!solved.solved && waits) {
+      waits = false;
       CarryGuess(last_contacts_, last_solution_, Guess::kLastStep);
       solve();
     }
