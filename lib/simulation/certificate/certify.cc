@@ -17,6 +17,7 @@
 #include "tangible/simulation/certificate/tolerances.h"
 #include "tangible/simulation/derivatives/rollout_directional.h"
 #include "tangible/simulation/derivatives/tolerances.h"
+#include "tangible/simulation/events/event_edges.h"
 #include "tangible/simulation/events/servo_bounds.h"
 #include "tangible/simulation/events/tolerances.h"
 
@@ -36,6 +37,15 @@ double ApproachOf(const StepRecord& impact, size_t first, size_t last) {
                                                  contact.b, block.normal_b));
   }
   return approach;
+}
+
+// What else than `own` jumps at a time, to `near`; empty: nothing does.
+std::string OtherJump(const Model<double>& model, double time, double near,
+                      const std::string& own) {
+  for (const LoadJump& jump : LoadJumpsWithin(model, time - near, time + near)) {
+    if (jump.what != own) return jump.what;
+  }
+  return "";
 }
 
 }  // namespace
@@ -402,6 +412,11 @@ void RolloutCertifier::AddForceWindows(const Model<double>& model) {
                  (same(time, 0.0) ? " s is the start of the run" : " s is the end of the run"));
         return;
       }
+      const double near =
+          kSameInstant * settings.dt + kCoordinateRounding * std::abs(settings.duration);
+      if (OwnSignalSteps(*model.structure, force, time - near, time + near)) {
+        OneSided(which + " s is where its own signal steps");
+      }
       // By events both sides agree; the places that fixed steps reach differ by a step's length.
       const double k =
           std::clamp(std::round(time / settings.dt), 0.0, static_cast<double>(NumSteps(settings)));
@@ -444,6 +459,9 @@ void RolloutCertifier::AddReleases(const Model<double>& model) {
       OneSided(which + " s is the start of the run");
     } else if (std::abs(time - settings.duration) <= near) {
       OneSided(which + " s is the end of the run");
+    } else if (const std::string other = OtherJump(model, time, near, "joint " + joint.name);
+               !other.empty()) {
+      OneSided(which + " s is where " + other + " steps");
     }
   }
 }
@@ -469,6 +487,10 @@ void RolloutCertifier::AddPaths(const Model<double>& model) {
       } else if (s.settings.stepping == Stepping::kFixed &&
                  IsSameInstant(s, time, StepTime(s.settings, step))) {
         OneSided(which + " s is on a step's boundary");
+      } else if (s.settings.stepping == Stepping::kEvent) {
+        const std::string other = OtherJump(model, time, kSameInstant * s.settings.dt,
+                                            "the speed of body " + s.bodies[index.body].name);
+        if (!other.empty()) OneSided(which + " s is where " + other + " steps");
       }
     }
   }

@@ -113,14 +113,19 @@ class RolloutCertifier {
   void AddBesideJumps(const Model<double>& model, const Segment& segment);
   void AddEventOf(const Model<double>& model, long step, EventDerivative* derivative,
                   Segment* segment);
+  void AddStoppedDead(const Model<double>& model, long step, const Segment& segment);
   void AddSegment(const Model<double>& model, long step, EventDerivative* derivative,
                   Segment* segment);
   void AddFriction(const CoefficientSource& friction, const Place& place);
   void AddEnd(const Model<double>& model, long step, const EventRecord& record);
+  void AddSupportsAtStart(const Model<double>& model, const Segment& first);
   void AddHandOversAtStart(const Model<double>& model, const State<double>& start,
                            const std::vector<const ActiveContact*>& touching);
   void AddHandOversAtEnd(const Model<double>& model, long step, const Segment& last);
   void AddTouchesAtEnd(const Model<double>& model, long step, const Segment& last);
+  void AddTouchBehind(const Model<double>& model, long step, const Segment& last,
+                      const ActiveContact& contact, const std::string& what);
+  void AddLimitsAtRelease(const Model<double>& model, long step, const Segment& segment);
   void AddClosedAtOnce(const Model<double>& model, long step, const Segment& segment);
   void AddQuality(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes,
                   ContactSystem* system);
@@ -173,7 +178,8 @@ class RolloutCertifier {
     ActiveContact contact;
     double time = 0.0;
   };
-  std::vector<Strike> strikes_;     ///< of the last impact, and of those shortly before it
+  std::vector<Strike> strikes_;       ///< of the last impact, and of those shortly before it
+  const Impulses* impact_ = nullptr;  ///< the last one in a step, until the motion that follows it
   const Segment* start_ = nullptr;  ///< the instant at which the run starts, until the first motion
   /// A located event near a step's end, of contacts of the whole model.
   struct Boundary {
@@ -181,6 +187,7 @@ class RolloutCertifier {
     double distance = 0.0;  ///< steps
   };
   std::vector<Boundary> boundaries_;  ///< whose next motion is still to come
+  bool edge_splits_ = false;          ///< an edge whose time is wanted is at a step's end, the same
   /// The same of an event at the instant at which a load on its bodies jumps.
   struct BesideJump {
     ActiveContact contact;

@@ -277,6 +277,45 @@ bool RolloutCertifier::SlidesAtLimit(const Model<double>& model, ContactMode by_
   return slip <= Negligible(model, slip) && !StartsToSlide(model, *segment, contact);
 }
 
+// What an impact stops dead, and the loads move on at once: a little slower or faster after the
+// impact it would slide on, or back until friction had stopped it.
+void RolloutCertifier::AddStoppedDead(const Model<double>& model, long step,
+                                      const Segment& segment) {
+  if (impact_ == nullptr || !(segment.length > 0.0)) return;
+  const ModelStructure& s = *model.structure;
+  const auto add = [&](double before, double after, const ActiveContact& contact) {
+    const double margin = before > Negligible(model, before) ? after / before : 1.0;
+    if (!(margin < kNearKinkMargin)) return;
+    AddMargin(margin, {&s, step, segment.time, 0, &contact, ContactMode::kOpen},
+              "an impact stops it, and its loads move it on");
+  };
+  for (size_t i = 0; i < segment.contacts.size(); ++i) {
+    const ActiveContact& contact = segment.contacts[i];
+    // The friction of an impact that holds a contact would hold it beside it too.
+    const bool held =
+        std::any_of(impact_->contacts.begin(), impact_->contacts.end(), [&](const auto& other) {
+          return other.SameAs(contact) &&
+                 impact_->solution.modes[static_cast<size_t>(&other - impact_->contacts.data())] ==
+                     ContactMode::kSticking;
+        });
+    if (!held && SlidingSign(segment.modes[i]) != 0.0 && segment.friction[i].value > 0.0 &&
+        StartsToSlide(model, segment, i)) {
+      add(SlipOf(model, impact_->before, contact), SlipOf(model, segment.before, contact), contact);
+    }
+  }
+  for (size_t k = 0; k < segment.before.supports.size(); ++k) {
+    const int body = s.supports[k].body;
+    if (segment.before.supports[k].slow != SupportState::kBody ||
+        segment.before.supports[k].holds != SupportState::kNothing) {
+      continue;
+    }
+    const auto speed = [&](const State<double>& state) {
+      return std::hypot(state.twist[3 * body], state.twist[3 * body + 1]);
+    };
+    add(speed(impact_->before), speed(segment.before), ContactOfSupport(s, static_cast<int>(k)));
+  }
+}
+
 void RolloutCertifier::AddSegment(const Model<double>& model, long step,
                                   EventDerivative* derivative, Segment* segment) {
   const ModelStructure& s = *model.structure;
@@ -327,6 +366,7 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
     }
     AddFriction(friction, place);
   }
+  AddStoppedDead(model, step, *segment);
   ForEachHeldSupport(model, *segment, [&](const SupportSlack& slack) {
     // What lets go at once is located as an event.
     const bool goes_at_once = segment->length == 0.0 && segment->event_index == slack.support &&
@@ -351,6 +391,7 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
     OneSided("windows of two forces open or close at " + Short(segment->time) +
              " s, where their order matters");
   }
+  AddLimitsAtRelease(model, step, *segment);
   AddEventOf(model, step, derivative, segment);
   AddQuality(start.problem, segment->modes, &start.system);
 }
@@ -380,15 +421,58 @@ void RolloutCertifier::AddSplits(const Model<double>& model, long step, const Se
     add(boundary, contact);
     return true;
   });
-  if (!segment.IsEventLocated()) return;
+  if (moves && edge_splits_) {
+    error = error < 0.0 ? SplitError(model, segment) : error;
+    if (error > kSplitMatters) {
+      OneSided("a window's edge at " + Short(segment.time) +
+               " s is on a step's end: beside it, it splits either step, which changes the "
+               "integrator's error");
+    }
+    edge_splits_ = false;
+  }
+  const bool is_edge = segment.event == EventKind::kEdge && Wanted(segment.event_number);
+  if (!segment.IsEventLocated() && !is_edge) return;
   const double end = segment.time + segment.length;
   // Nothing moves before the run's start.
   const double since = step > 0 ? std::abs(end - StepTime(settings, step)) : HUGE_VAL;
   const double distance =
       std::min(since, std::abs(end - StepTime(settings, step + 1))) / settings.dt;
   if (!(distance < kNearKinkMargin)) return;
+  if (is_edge) {
+    edge_splits_ = true;
+    return;
+  }
   boundaries_.push_back({in_whole(segment.event_contact), distance});
   if (moves) add(boundaries_.back(), segment.event_contact);
+}
+
+// A joint that ends as it reaches its limit, or just before: beside it the limit is met.
+void RolloutCertifier::AddLimitsAtRelease(const Model<double>& model, long step,
+                                          const Segment& segment) {
+  if (segment.event != EventKind::kEdge || segment.event_number < 0) return;
+  const ModelStructure& s = *model.structure;
+  std::vector<ActiveContact> limits;
+  AppendLimits(model, segment.before, &limits);
+  for (const ActiveContact& limit : limits) {
+    if (s.joints[limit.joint].until != segment.event_number) continue;
+    AddTouchBehind(model, step, segment, limit, "as the joint ends");
+  }
+}
+
+// What would touch just behind a motion, though the run or a joint ends.
+void RolloutCertifier::AddTouchBehind(const Model<double>& model, long step, const Segment& last,
+                                      const ActiveContact& contact, const std::string& what) {
+  const ModelStructure& s = *model.structure;
+  const bool is_closed = std::any_of(last.contacts.begin(), last.contacts.end(),
+                                     [&](const ActiveContact& c) { return c.SameAs(contact); });
+  const double speed = SpeedsOf(model, last.after, contact).normal;
+  if (is_closed || !(speed < -Negligible(model, speed))) return;
+  ContactRows<double> rows;
+  EvaluateActiveRows(model, last.after, contact, &rows);
+  const double margin = std::max(rows.geometry.gap, 0.0) / (-speed * s.settings.dt);
+  if (margin < kNearJumpMargin) {
+    AddJump(margin, {&s, step, last.time + last.length, 0, &contact, ContactMode::kOpen}, what);
+  }
 }
 
 // Touches at the end of the run's last motion, or just behind it.
@@ -407,17 +491,7 @@ void RolloutCertifier::AddTouchesAtEnd(const Model<double>& model, long step, co
   search.FindContacts(model, last.after, reach, &near);
   AppendLimits(model, last.after, &near);
   for (const ActiveContact& contact : near) {
-    const bool is_closed = std::any_of(last.contacts.begin(), last.contacts.end(),
-                                       [&](const ActiveContact& c) { return c.SameAs(contact); });
-    const double speed = SpeedsOf(model, last.after, contact).normal;
-    if (is_closed || !(speed < -Negligible(model, speed))) continue;
-    ContactRows<double> rows;
-    EvaluateActiveRows(model, last.after, contact, &rows);
-    const double margin = std::max(rows.geometry.gap, 0.0) / (-speed * s.settings.dt);
-    if (margin < kNearJumpMargin) {
-      AddJump(margin, {&s, step, last.time + last.length, 0, &contact, ContactMode::kOpen},
-              "the run ends as it touches");
-    }
+    AddTouchBehind(model, step, last, contact, "the run ends as it touches");
   }
 }
 
@@ -554,6 +628,8 @@ void RolloutCertifier::AddIsland(const Model<double>& model, long step, EventDer
                                  IslandRecord* island) {
   EventRecord& record = island->events;
   start_ = nullptr;
+  impact_ = nullptr;
+  edge_splits_ = false;
   if (step == 0 && Directions().cols() > 0) {
     AddStart(model, record);
   }
@@ -563,10 +639,14 @@ void RolloutCertifier::AddIsland(const Model<double>& model, long step, EventDer
   for (int p = 0; p < record.num_parts; ++p) {
     EventPart& part = *record.parts[p];
     if (part.is_impulses) {
-      if (!part.impulses.holds) AddImpact(model, step, &part.impulses);
+      if (!part.impulses.holds) {
+        AddImpact(model, step, &part.impulses);
+        impact_ = &part.impulses;
+      }
       continue;
     }
     AddSegment(model, step, derivative, &part.segment);
+    if (part.segment.length > 0.0) impact_ = nullptr;
     if (part.segment.IsEventLocated()) {
       const int count = located.Add(part.segment.event_contact);
       last = count > most ? &part.segment : last;

@@ -7,6 +7,7 @@
 
 #include "tangible/dynamics/elements/force.h"
 #include "tangible/dynamics/jacobian/contact_gradient.h"
+#include "tangible/dynamics/model/lengths.h"
 #include "tangible/simulation/certificate/certify_place_inl.h"
 #include "tangible/simulation/certificate/feature_ties.h"
 #include "tangible/simulation/certificate/split_error.h"
@@ -14,6 +15,7 @@
 #include "tangible/simulation/certificate/tolerances.h"
 #include "tangible/simulation/events/event_search.h"
 #include "tangible/simulation/events/segment_flow.h"
+#include "tangible/simulation/events/support_bounds.h"
 #include "tangible/simulation/events/tolerances.h"
 
 namespace tangible {
@@ -220,8 +222,28 @@ void RolloutCertifier::AddStart(const Model<double>& model, const EventRecord& r
     }
   }
   if (start != nullptr) AddHandOversAtStart(model, *start, touching);
+  if (first != nullptr) AddSupportsAtStart(model, *first);
   if (start != nullptr && certificate_.one_sided.empty()) {
     ProbeStarts(model, *start, touching, first);
+  }
+}
+
+// A body at rest on a support, which its load moves at once: set sliding against it, the body first
+// has the friction of the other direction.
+void RolloutCertifier::AddSupportsAtStart(const Model<double>& model, const Segment& first) {
+  const ModelStructure& s = *model.structure;
+  for (size_t k = 0; k < first.before.supports.size(); ++k) {
+    const SupportState& at = first.before.supports[k];
+    const int body = s.supports[k].body;
+    const double* twist = &first.before.twist[3 * static_cast<size_t>(body)];
+    const bool rests = std::hypot(twist[0], twist[1]) <= Negligible(model, 0.0) &&
+                       std::abs(twist[2]) * RadiusOf(model, body) <= Negligible(model, 0.0);
+    if (at.holds != SupportState::kNothing || at.slow != SupportState::kBody || !rests) continue;
+    for (Eigen::Index c = 0; c < Directions().cols(); ++c) {
+      if (Directions().col(c).segment<3>(s.TwistVariable(body, 0)).isZero(0.0)) continue;
+      OneSided(ContactName(s, ContactOfSupport(s, static_cast<int>(k))) + " rests at the start, " +
+               options_.names[static_cast<size_t>(c)] + " sets it sliding");
+    }
   }
 }
 

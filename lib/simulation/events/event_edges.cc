@@ -118,7 +118,9 @@ void EdgeGroup::Add(const Edge& edge) {
 }
 
 void EdgeGroup::PutStepsFirst() {
-  if (!steps || window.force < 0) return;
+  if (!steps || window.number < 0) return;
+  if (gives_way) window = WindowEdge();
+  if (window.force < 0) return;
   further.insert(further.begin(), window);
   window = WindowEdge();
 }
@@ -200,6 +202,23 @@ std::vector<LoadJump> LoadJumpsWithin(const Model<double>& model, double from, d
     }
   });
   return jumps;
+}
+
+bool OwnSignalSteps(const ModelStructure& structure, const ForceIndex& force, double from,
+                    double to) {
+  const auto steps = [&](int index) {
+    if (index < 0) return false;
+    const Signal& signal = structure.signals[index];
+    for (size_t k = 1; k < signal.time.size(); ++k) {
+      if (signal.time[k] >= from && signal.time[k] <= to && JumpsAt(signal, k)) return true;
+    }
+    return false;
+  };
+  if (steps(force.force_signal) || steps(force.torque_signal)) return true;
+  return std::any_of(
+      structure.servos.begin(), structure.servos.end(), [&](const ServoIndex& servo) {
+        return servo.force >= 0 && &structure.forces[servo.force] == &force && steps(servo.signal);
+      });
 }
 
 bool JumpPullsJoint(const Model<double>& model, double time) {

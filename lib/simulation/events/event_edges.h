@@ -57,7 +57,7 @@ struct EdgeGroup {
 
   void Add(const Edge& edge);
   /// Where a signal's value jumps beside a window's edge, that given time comes first: it must not
-  /// move with the window's.
+  /// move with the window's. A knot at which nothing jumps is left out there.
   void PutStepsFirst();
 };
 
@@ -78,6 +78,10 @@ struct LoadJump {
 /// The jumps of loads within [from, to]: windows of forces, steps of signals, ends of joints, and
 /// jumps of the rates of paths.
 std::vector<LoadJump> LoadJumpsWithin(const Model<double>& model, double from, double to);
+
+/// Whether a signal of the force itself, or the target of its servo, steps within [from, to].
+bool OwnSignalSteps(const ModelStructure& structure, const ForceIndex& force, double from,
+                    double to);
 
 /// Adds to accelerations at a segment's state the loads (N, N, N m) by which its edges still to
 /// come differ from those passed: −F where a window opens, F where it closes.

@@ -346,5 +346,112 @@ TEST(GradientSidesTest, ARodThatSlidesHasOneDerivative) {
   }
 }
 
+// A striker under 1 N that a target of its own mass stops dead, after 1/2 m at `under` m/s^2: a
+// heavier target sends it back, against friction, and its load brings it to rest and on; a lighter
+// one lets it slide on. By its own speed it stops dead for every one, and there is no kink.
+void ExpectStoppedDead(const Scene& scene, double friction, double end) {
+  const double onward = 1.0 - friction;
+  const double back = 1.0 + friction;
+  const double struck = std::sqrt(1.0 + onward);  // at 1 m/s in the beginning
+  const double left = end - (struck - 1.0) / onward;
+  const double slope = -0.5 * struck;
+  EXPECT_NEAR(Plus(scene, "bodies/target/mass", 3), slope * onward / back, 1e-7);
+  EXPECT_NEAR(Minus(scene, "bodies/target/mass", 3), slope, 1e-7);
+  EXPECT_NEAR(Minus(scene, "bodies/target/mass", 0), slope * left, 1e-7);
+  const GradientResult result =
+      FinalStateJacobian(scene, testing::Resolve(scene, {"bodies/target/mass"}), {});
+  EXPECT_NE(result.certificate.verdict.find("an impact stops it"), std::string::npos)
+      << result.certificate.verdict;
+}
+
+TEST(GradientSidesTest, AStrikerThatIsStoppedDeadAndDrivenOn) {
+  const std::string bodies =
+      R"({"gravity": [0, 0], "bodies": [
+      {"name": "striker", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0, 0],
+       "velocity": [1, 0], "friction": 0, "restitution": 1 SUPPORT},
+      {"name": "target", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0.7, 0],
+       "friction": 0, "restitution": 1}],
+      "forces": [{"name": "load", "body": "striker", "force": [1, 0]}] JOINT,
+      "simulation": {"duration": 1, "stepping": "event"}})";
+  const auto with = [&](const std::string& support, const std::string& joint, double dt) {
+    std::string text = bodies;
+    text.replace(text.find(" SUPPORT"), 8, support);
+    text.replace(text.find(" JOINT"), 6, joint);
+    Scene scene = SceneOf(text);
+    scene.simulation.dt = dt;
+    return scene;
+  };
+  for (const double dt : {0.01, 0.25}) {
+    const std::string rail = R"(, "joints": [{"name": "rail", "type": "prismatic",
+        "bodies": ["striker", "world"], "anchor": [0, 0], "axis": [1, 0], "friction": )";
+    ExpectStoppedDead(with("", rail + "0.5}]", dt), 0.5, 1.0);
+    // Without friction, or held by it, there is no kink.
+    for (const char* friction : {"0", "1.25"}) {
+      const Scene scene = with("", rail + friction + "}]", dt);
+      EXPECT_EQ(FinalStateJacobian(scene, testing::Resolve(scene, {"bodies/target/mass"}), {})
+                    .certificate.verdict,
+                "trustworthy")
+          << friction;
+    }
+  }
+  ExpectStoppedDead(with(R"(, "support": {"load": 1, "friction": 0.5})", "", 0.01), 0.5, 1.0);
+}
+
+// A puck at rest under a load beyond its support's friction: v(T) is v0 + a T for a start onward,
+// and a T + v0 (F - R) / (F + R) for one against the load.
+TEST(GradientSidesTest, APuckAtRestUnderALoadBeyondItsSupport) {
+  for (const double load : {8.0, -6.0}) {
+    Scene scene = SceneOf(R"({"gravity": [0, 0], "bodies": [
+        {"name": "puck", "mass": 1, "inertia": 1, "position": [0, 0],
+         "support": {"load": 10, "friction": 0.5}}],
+        "forces": [{"name": "f", "body": "puck", "force": [8, 0]}],
+        "simulation": {"dt": 0.01, "duration": 0.5, "stepping": "event"}})");
+    scene.forces[0].force.x() = load;
+    const double slow = (std::abs(load) - 5.0) / (std::abs(load) + 5.0);
+    EXPECT_NEAR(Plus(scene, "bodies/puck/velocity/x", 3), load > 0.0 ? 1.0 : slow, 1e-6);
+    EXPECT_NEAR(Minus(scene, "bodies/puck/velocity/x", 3), load > 0.0 ? slow : 1.0, 1e-6);
+    const GradientResult by_load =
+        FinalStateJacobian(scene, testing::Resolve(scene, {"forces/f/force/x"}), {});
+    EXPECT_EQ(by_load.certificate.verdict, "trustworthy");
+    EXPECT_NEAR(by_load.jacobian(3, 0), 0.5, 1e-9);
+  }
+}
+
+// A window that ends, or opens, as its force steps from 1 N to 3 N: what is gained or lost on each
+// side is the force of that side. As another force steps, there is one derivative.
+TEST(GradientSidesTest, AWindowsEdgeWhereItsOwnSignalSteps) {
+  for (const bool is_end : {true, false}) {
+    for (const double edge : {0.5, 0.505}) {
+      Scene scene = SceneOf(R"({"gravity": [0, 0], "bodies": [
+          {"name": "b", "mass": 1, "inertia": 1, "position": [0, 0]}],
+          "forces": [{"name": "f", "body": "b", "force": [0, 0], "start": 0.125, "end": 0.875}],
+          "simulation": {"dt": 0.01, "duration": 1, "stepping": "event"}})");
+      Signal load;
+      load.time = {0.0, edge};
+      load.x = {1.0, 3.0};
+      load.y = {0.0, 0.0};
+      scene.forces[0].force_signal = load;
+      (is_end ? scene.forces[0].end : scene.forces[0].start) = edge;
+      const std::string path = is_end ? "forces/f/end" : "forces/f/start";
+      for (const Stepping stepping : {Stepping::kEvent, Stepping::kFixed}) {
+        // Fixed steps look beside a window's edge where it is on a step's end.
+        if (stepping == Stepping::kFixed && edge != 0.5) continue;
+        scene.simulation.stepping = stepping;
+        EXPECT_NEAR(Plus(scene, path, 3), is_end ? 3.0 : -3.0, 1e-9) << edge;
+        EXPECT_NEAR(Minus(scene, path, 3), is_end ? 1.0 : -1.0, 1e-9) << edge;
+      }
+      scene.simulation.stepping = Stepping::kEvent;
+      EXPECT_EQ(
+          FinalStateJacobian(scene, testing::Resolve(scene, {path}), {}).certificate.one_sided,
+          std::string(is_end ? "end" : "start") + " of force f at " +
+              (edge == 0.5 ? "0.5" : "0.505") + " s is where its own signal steps");
+      std::swap(scene.forces[0].force_signal->x[0], scene.forces[0].force_signal->x[1]);
+      scene.forces[0].force_signal->x[1] = scene.forces[0].force_signal->x[0];
+      EXPECT_EQ(FinalStateJacobian(scene, testing::Resolve(scene, {path}), {}).certificate.verdict,
+                "trustworthy");
+    }
+  }
+}
+
 }  // namespace
 }  // namespace tangible

@@ -158,5 +158,66 @@ TEST(UntilTest, FixedStepsBeginWithOrWithoutAJoint) {
       "trustworthy");
 }
 
+// A slider under −1 N until T, where the force on it steps from 1 N to 3 N: v(1.5) = −T + 2 from
+// both sides, and the end's derivative must not take the step along. As the joint's own effort
+// steps there, each side has the effort of its side.
+TEST(UntilTest, AnEndWhereASignalStepsIsNamed) {
+  const auto scene_with = [](const char* joint, const char* force, double dt) {
+    Scene scene = SceneOf(std::string(R"({"gravity": [0, 0], "bodies": [
+        {"name": "b", "mass": 1, "inertia": 1, "position": [0, 0]}],
+        "joints": [{"name": "j", "type": "prismatic", "bodies": ["b", "world"], "anchor": [0, 0],
+                    "axis": [1, 0], "until": 0.5)") +
+                          joint + R"(}], "forces": [{"name": "f", "body": "b", "force": )" + force +
+                          "}]" + Settings("event", "0.1"));
+    scene.simulation.dt = dt;
+    return scene;
+  };
+  const auto side = [](const Scene& scene, DerivativeSide of) {
+    return FinalStateJacobian(scene, testing::Resolve(scene, {"joints/j/until"}), {.side = of});
+  };
+  for (const double dt : {0.1, 0.25, 0.03}) {
+    Scene scene = scene_with(R"(, "effort": -1)", "[0, 0]", dt);
+    Signal steps;
+    steps.time = {0.0, 0.5, 1.0};
+    steps.x = {1.0, 3.0, 0.0};
+    steps.y = {0.0, 0.0, 0.0};
+    scene.forces[0].force_signal = steps;
+    const GradientResult plus = side(scene, DerivativeSide::kPlus);
+    EXPECT_NEAR(plus.jacobian(3, 0), -1.0, 1e-8) << dt;
+    EXPECT_NEAR(side(scene, DerivativeSide::kMinus).jacobian(3, 0), -1.0, 1e-8) << dt;
+    EXPECT_EQ(plus.certificate.one_sided,
+              "end of joint j at 0.5 s is where the signal of force f steps");
+
+    Scene own = scene_with(R"(, "effort": 0)", "[0, 0]", dt);
+    Signal effort;
+    effort.time = {0.0, 0.5};
+    effort.value = {1.0, 3.0};
+    own.joints[0].effort_signal = effort;
+    EXPECT_NEAR(side(own, DerivativeSide::kPlus).jacobian(3, 0), 3.0, 1e-8) << dt;
+    EXPECT_NEAR(side(own, DerivativeSide::kMinus).jacobian(3, 0), 1.0, 1e-8) << dt;
+  }
+}
+
+// A slider that reaches its limit as its joint ends flies on or comes back, also where rounding puts
+// the end before the touch.
+TEST(UntilTest, AnEndAtALimitIsAJump) {
+  for (const double dt : {0.25, 0.1, 0.05, 0.03}) {
+    for (const double later : {0.0, 1e-12, 1e-9}) {
+      Scene scene = SceneOf(std::string(R"({"gravity": [0, 0], "bodies": [
+          {"name": "b", "mass": 1, "inertia": 1, "position": [0, 0], "velocity": [0.5, 0]}],
+          "joints": [{"name": "j", "type": "prismatic", "bodies": ["b", "world"],
+                      "anchor": [0, 0], "axis": [1, 0], "limits": [-1, 0.5],
+                      "limit_restitution": 1, "until": 1}])") +
+                            Settings("event", "0.1"));
+      scene.simulation.dt = dt;
+      scene.joints[0].limits->second += later;
+      const GradientResult result =
+          FinalStateJacobian(scene, testing::Resolve(scene, {"joints/j/until"}), {});
+      EXPECT_NE(result.certificate.verdict.find("discontinuous"), std::string::npos)
+          << dt << " " << later << ": " << result.certificate.verdict;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace tangible
