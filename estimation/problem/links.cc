@@ -17,6 +17,7 @@ struct Moved {
   Vector2<double> from{0.0, 0.0}, to{0.0, 0.0};  ///< m, world
   int body = kWorld;                             ///< of the link
   std::vector<int> beyond;                       ///< bodies
+  bool carries = false;                          ///< the body's centre of mass is at `to`
   double Length() const { return (to - from).norm(); }
   bool Has(int one) const { return std::find(beyond.begin(), beyond.end(), one) != beyond.end(); }
 };
@@ -93,6 +94,8 @@ std::string Find(const Scene& scene, const std::vector<BodyPoint>& points, const
     moved->body = to.body;
     moved->to = PlaceOf(scene, to);
   }
+  const Vector2<double>& centre = scene.bodies[static_cast<size_t>(moved->body)].position;
+  moved->carries = (centre - moved->to).norm() <= kLinkEnd * moved->Length();
   return moved->Length() > 0.0 ? "" : "expected two places, got a length of 0";
 }
 
@@ -125,9 +128,11 @@ class Sets {
 std::vector<ParameterSet> SetsOf(const Scene& scene, const std::vector<BodyPoint>& points,
                                  const Link& link, const Moved& moved, const ParameterSet& length) {
   Sets sets(length, moved);
-  for (const int body : moved.beyond) {
+  const auto move_body = [&](int body) {
     sets.Move("bodies/" + scene.bodies[static_cast<size_t>(body)].name + "/position");
-  }
+  };
+  if (moved.carries) move_body(moved.body);
+  for (const int body : moved.beyond) move_body(body);
   for (size_t j = 0; j < scene.joints.size(); ++j) {
     const auto& joint = scene.joints[j];
     const std::string path = "joints/" + joint.name + "/anchor";
@@ -150,12 +155,13 @@ std::vector<ParameterSet> SetsOf(const Scene& scene, const std::vector<BodyPoint
   }
   for (size_t i = 0; i < points.size(); ++i) {
     const BodyPoint& point = points[i];
-    const bool is_end = static_cast<int>(i) == link.to_point;
-    if (is_end || (point.body == moved.body &&
-                   (PlaceOf(scene, point) - moved.to).norm() <= kLinkEnd * moved.Length())) {
-      const double angle = scene.bodies[static_cast<size_t>(point.body)].angle;
-      sets.Move("points/" + point.name + "/at", Turned(-angle, sets.along()));
-    }
+    if (point.body != moved.body) continue;
+    const bool is_at_end = static_cast<int>(i) == link.to_point ||
+                           (PlaceOf(scene, point) - moved.to).norm() <= kLinkEnd * moved.Length();
+    if (is_at_end == moved.carries) continue;
+    const double angle = scene.bodies[static_cast<size_t>(point.body)].angle;
+    const double sign = moved.carries ? -1.0 : 1.0;
+    sets.Move("points/" + point.name + "/at", sign * Turned(-angle, sets.along()));
   }
   return std::move(sets).all();
 }
@@ -196,11 +202,12 @@ bool ExpandLengths(const Scene& scene, const std::vector<BodyPoint>& points,
         Merge({set}, &expanded);
         continue;
       }
-      const auto link = std::find_if(links.begin(), links.end(), [&set](const Link& one) {
-        return LengthPath(one) == set.path;
-      });
+      std::vector<const Link*> of_path;
+      for (const Link& one : links) {
+        if (MatchesPath(set.path, LengthPath(one))) of_path.push_back(&one);
+      }
       *error = {static_cast<int>(k), static_cast<int>(i), "path", ""};
-      if (link == links.end()) {
+      if (of_path.empty()) {
         std::string names;
         for (const Link& one : links) names += (names.empty() ? "" : ", ") + LengthPath(one);
         error->what = "parameter " + set.path + ": matches no number; of links there are: " +
@@ -212,14 +219,16 @@ bool ExpandLengths(const Scene& scene, const std::vector<BodyPoint>& points,
         error->what = "expected a number other than 0, got 0";
         return false;
       }
-      Moved moved;
-      error->what = Find(scene, points, *link, &moved);
-      if (!error->what.empty()) return false;
-      if (i == 0) {
-        parameter.initial = parameter.initial.value_or((moved.Length() - set.offset) / set.scale);
-        if (set.scale > 0.0 && !parameter.lower) parameter.lower = -set.offset / set.scale;
+      for (const Link* link : of_path) {
+        Moved moved;
+        error->what = Find(scene, points, *link, &moved);
+        if (!error->what.empty()) return false;
+        if (i == 0) {
+          parameter.initial = parameter.initial.value_or((moved.Length() - set.offset) / set.scale);
+          if (set.scale > 0.0 && !parameter.lower) parameter.lower = -set.offset / set.scale;
+        }
+        Merge(SetsOf(scene, points, *link, moved, set), &expanded);
       }
-      Merge(SetsOf(scene, points, *link, moved, set), &expanded);
     }
     parameter.sets = std::move(expanded);
   }

@@ -84,6 +84,11 @@ RolloutResiduals::RolloutResiduals(ParameterizedScene scene, std::vector<Observa
   if (std::any_of(observations_.begin(), observations_.end(), is_event)) {
     event_times_ = EventTimes(scene_.instruments().events, observations_);
   }
+  // Where clocks or delays are estimated, the last observations may be of a time behind the end.
+  if (sample_options_.rates && !HasEvents()) {
+    const double more = std::ceil(kRunsOn * settings_.duration / settings_.dt);
+    settings_.duration = (static_cast<double>(NumSteps(settings_)) + more) * settings_.dt;
+  }
   UpdateTimes();
 }
 

@@ -12,6 +12,9 @@ inline constexpr double kTimeTolerance = 1e-9;
 /// Of a step: half the time over which an acceleration is averaged in event stepping; steps end at
 /// both ends of that time.
 inline constexpr double kRateStep = 1e-3;
+/// Of the duration: how much longer a run may be where clocks or delays are estimated, because the
+/// last observations may be of a later time.
+inline constexpr double kRunsOn = 0.1;
 /// Of 1, a component of a direction: what is smaller is the rounding of a link along an axis.
 inline constexpr double kLinkDirection = 1e-12;
 /// Of the length of a link: a point of its body that is nearer to its end moves with it.

@@ -297,6 +297,43 @@ TEST(FitTest, InstrumentsAreFoundBesideThePhysics) {
   }
 }
 
+/// A body that falls, by a clock that is 0.2 % slow, up to the end of the scene: the last
+/// observations are of later times. Its place is x = v t, y = −g t² / 2.
+TEST(FitTest, AClockMayShowTimesBehindTheEnd) {
+  Scene scene = MakeScene(R"({"gravity": [0, -9.81], "bodies": [
+      {"name": "b", "mass": 1, "inertia": 1, "position": [0, 0], "velocity": [2, 0]}],
+      "simulation": {"dt": 0.01, "duration": 2, "stepping": "event"}})");
+  Instruments instruments;
+  instruments.clocks = {{"clock", 1.0, 0.0}};
+  std::vector<Channel> channels(1);
+  channels[0] = {.clock = 0};
+  std::vector<Observation> observations;
+  for (int k = 0; k <= 200; ++k) {
+    const double time = 0.01 * k;
+    const double in_run = 1.002 * time;
+    observations.push_back({time, 0, -1, Coordinate::kX, 2.0 * in_run, 1e-3, 0});
+    observations.push_back({time, 0, -1, Coordinate::kY, -4.905 * in_run * in_run, 1e-3, 0});
+  }
+  ParameterizedScene parameterized;
+  ParameterError error;
+  ASSERT_TRUE(parameterized.Create(
+      scene, {}, {Parameter("clocks/clock/rate", 1.0), Parameter("bodies/b/velocity/x", 1.9)},
+      &error, instruments))
+      << error.what;
+  RolloutResiduals residuals(parameterized, observations, channels);
+  const FitResult result = Fit(FitOptions(), &residuals, {});
+  ASSERT_EQ(result.status, FitStatus::kConverged) << result.message;
+  EXPECT_NEAR(result.estimate[0], 1.002, 1e-9);
+  EXPECT_NEAR(result.estimate[1], 2.0, 1e-8);
+  // A tenth of the run, and no more.
+  Eigen::VectorXd late = residuals.scene().Initial();
+  Eigen::VectorXd values;
+  late[0] = 1.11;
+  EXPECT_FALSE(residuals.Evaluate(late, GradientMethod::kTangent, &values, nullptr));
+  EXPECT_NE(residuals.message().find("outside of [0, 2.2] s"), std::string::npos)
+      << residuals.message();
+}
+
 /// A pendulum's lamp, the only thing seen, with an aspect of 1.02 and a lens that moves it outwards
 /// by 2 % at half a metre; the fit knows neither, nor where the pendulum begins.
 TEST(FitTest, AspectAndLensOfACameraAreFound) {

@@ -105,5 +105,49 @@ TEST(LinksTest, MistakesAreOneLine) {
   EXPECT_NE(CheckLink(scene, {}, {"same", 1, 1, -1}), "");
 }
 
+// A bob whose centre of mass is at the end of its link hangs at the length, and carries the next
+// one: the scene that someone draws with other lengths.
+TEST(LinksTest, ABobMovesWithTheEndOfItsLink) {
+  constexpr char kBobs[] = R"({"bodies": [
+    {"name": "upper", "mass": 1, "inertia": 1e-3, "position": [0, -0.4]},
+    {"name": "lower", "mass": 0.7, "inertia": 1e-3, "position": [0, -0.7], "angle": 0.5}],
+    "joints": [
+    {"name": "top", "type": "revolute", "bodies": ["upper", "world"], "anchor": [0, 0], "angle": 1},
+    {"name": "middle", "type": "revolute", "bodies": ["lower", "upper"], "anchor": [0, -0.4]}],
+    "simulation": {"dt": 0.005, "duration": 0.5}})";
+  const Scene scene = MakeScene(kBobs);
+  const double c = std::cos(0.5);
+  const double s = std::sin(0.5);
+  // The lower bob, and a mark on its body at the middle joint.
+  const std::vector<BodyPoint> points = {{"bob", 1, {0.0, 0.0}}, {"mark", 1, {s * 0.3, c * 0.3}}};
+  const std::vector<Link> links = {{"upper", 0, 1, -1}, {"lower", 1, -1, 0}};
+  std::vector<FitParameter> parameters = {Parameter("links/upper/length", 0.4),
+                                          Parameter("links/lower/length", 0.3)};
+  ParameterError error;
+  ASSERT_TRUE(ExpandLengths(scene, points, links, &parameters, &error)) << error.what;
+  ParameterizedScene parameterized;
+  ASSERT_TRUE(parameterized.Create(scene, points, parameters, &error)) << error.what;
+  ASSERT_TRUE(parameterized.Set(Eigen::Vector2d(0.45, 0.28)));
+  const Scene& other = parameterized.scene();
+  EXPECT_NEAR(other.bodies[0].position.y(), -0.45, 1e-15);
+  EXPECT_NEAR(other.bodies[1].position.y(), -0.73, 1e-15);
+  EXPECT_NEAR(other.joints[1].anchors[0].y(), -0.45, 1e-15);
+  EXPECT_NEAR(other.joints[0].anchors[0].y(), 0.0, 1e-15);
+  EXPECT_NEAR(parameterized.points()[0].at.norm(), 0.0, 1e-15);
+  // The mark stays at the joint.
+  const Vector2<double> at = parameterized.points()[1].at;
+  EXPECT_NEAR(c * at.x() - s * at.y(), 0.0, 1e-15);
+  EXPECT_NEAR(s * at.x() + c * at.y(), 0.28, 1e-15);
+
+  // One parameter for both, as a pattern.
+  std::vector<FitParameter> both = {Parameter("links/*/length", 0.5)};
+  ASSERT_TRUE(ExpandLengths(scene, points, links, &both, &error)) << error.what;
+  ParameterizedScene equal;
+  ASSERT_TRUE(equal.Create(scene, points, both, &error)) << error.what;
+  ASSERT_TRUE(equal.Set(Eigen::VectorXd::Constant(1, 0.35)));
+  EXPECT_NEAR(equal.scene().bodies[0].position.y(), -0.35, 1e-15);
+  EXPECT_NEAR(equal.scene().bodies[1].position.y(), -0.7, 1e-15);
+}
+
 }  // namespace
 }  // namespace tangible
