@@ -203,5 +203,21 @@ TEST_F(WarningsTest, AGradientSaysItToo) {
   EXPECT_NE(run.error.find(note), std::string::npos) << note;
 }
 
+TEST_F(WarningsTest, AStartBeyondALimitIsNamed) {
+  const auto scene = [](const std::string& low) {
+    return R"({"gravity": [0, 0], "bodies": [
+        {"name": "b", "mass": 1, "inertia": 1, "position": [0, 0]}],
+        "joints": [{"name": "rail", "type": "prismatic", "bodies": ["b", "world"],
+                    "anchor": [0, 0], "axis": [1, 0], "limits": [)" +
+           low + R"(, 2]}], "simulation": {"dt": 0.01, "duration": 0.1}})";
+  };
+  const ProgramRun beyond = Simulate(scene("1"), "--out=/dev/null");
+  EXPECT_EQ(beyond.exit_status, 0);
+  EXPECT_NE(beyond.error.find("begins with joint rail beyond its low limit by 1 m"),
+            std::string::npos)
+      << beyond.error;
+  EXPECT_EQ(Simulate(scene("0"), "--out=/dev/null").error.find("limit"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace tangible

@@ -4,7 +4,10 @@
 #include <cstdio>
 #include <utility>
 
+#include "tangible/dynamics/elements/contact.h"
+#include "tangible/dynamics/model/lengths.h"
 #include "tangible/geometry/tolerances.h"
+#include "tangible/simulation/events/tolerances.h"
 #include "tangible/simulation/stepping/energy_watch.h"
 
 namespace tangible {
@@ -21,6 +24,28 @@ std::string FlushStepsMessage(const Model<double>& model) {
   return text;
 }
 
+// Empty, or the line that names a limit of a joint that a run begins beyond.
+std::string BrokenLimitMessage(const Model<double>& model, const State<double>& initial) {
+  std::vector<ActiveContact> limits;
+  AppendLimits(model, initial, &limits);
+  const Lengths lengths(model);
+  for (const ActiveContact& limit : limits) {
+    const JointIndex& joint = model.structure->joints[limit.joint];
+    ContactRows<double> rows;
+    EvaluateActiveRows(model, initial, limit, &rows);
+    if (rows.geometry.gap >= -kBrokenTouches * lengths.LimitTouch(initial, joint)) continue;
+    char text[256];
+    std::snprintf(
+        text, sizeof text,
+        "the run begins with joint %s beyond its %s limit by %.3g %s: it is moved back at "
+        "recovery_speed, %.3g m/s or rad/s",
+        joint.name.c_str(), limit.side > 0.0 ? "low" : "high", -rows.geometry.gap,
+        joint.type == JointType::kRevolute ? "rad" : "m", model.structure->settings.recovery_speed);
+    return text;
+  }
+  return "";
+}
+
 }  // namespace
 
 std::vector<std::string> RunWarnings::Finish(const Model<double>& model,
@@ -31,8 +56,9 @@ std::vector<std::string> RunWarnings::Finish(const Model<double>& model,
   std::vector<std::string> lines;
   std::string energy = report.energy_grown;
   if (energy.empty()) energy = EnergyOfOverlap(model, initial_, final, report.penetration_max);
-  for (std::string line : {coordinates_.Message(model), joints_.Message(model),
-                           FlushStepsMessage(model), std::move(energy)}) {
+  for (std::string line :
+       {coordinates_.Message(model), joints_.Message(model), BrokenLimitMessage(model, initial_),
+        FlushStepsMessage(model), std::move(energy)}) {
     if (!line.empty()) lines.push_back(std::move(line));
   }
   return lines;
