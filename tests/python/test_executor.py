@@ -102,7 +102,7 @@ def table() -> dict[str, Any]:
 
 def without_times(data: Any) -> Any:
     if isinstance(data, dict):
-        return {key: without_times(item) for key, item in data.items() if key not in ("seconds", "file")}
+        return {key: without_times(item) for key, item in data.items() if key != "seconds"}
     return [without_times(item) for item in data] if isinstance(data, list) else data
 
 

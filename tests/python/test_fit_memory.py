@@ -206,7 +206,7 @@ def test_scenes_that_the_data_leave_possible() -> None:
         ({"data": {"time": [0.0, 0.1], "x": [1.0]}}, r"x: expected shape \(2,\), as time, got \(1,\)"),
         ({"data": {"time": [0.0], "x": ["a"]}}, "x: expected numbers"),
         ({"data": {"time": [0.0], "ball/x": [0.0], "y": [1.0]}}, "columns like ball/x, got y"),
-        ({"data": {"time": [0.0], "bal/x": [0.0]}}, "^observations/0: line 2: body: .*bal"),
+        ({"data": {"time": [0.0], "bal/x": [0.0]}}, "^data: line 2: body: .*bal"),
         ({"data": {"time": [np.nan], "ball/x": [0.0]}}, "time: expected finite numbers"),
         ({"data": 3}, "expected a dict of arrays or a DataFrame, got int"),
         ({"data": None}, "expected a dict of arrays or a DataFrame with a scene"),
@@ -323,3 +323,196 @@ def test_random_forces_are_found_over_time() -> None:
     assert (course["standard_deviation"] > 0).all()
     with pytest.raises(TypeError, match="process_noise"):
         tangible.fit("fit.json", process_noise=noise)
+
+
+def pendulum(damping: float = 0.02, **simulation: Any) -> dict[str, Any]:
+    return {
+        "name": "pendulum", "bodies": [{"name": "bob", "mass": 1.0, "inertia": 0.01, "position": [0, -0.5]}],
+        "joints": [{"name": "pin", "type": "revolute", "bodies": ["bob", "world"], "anchor": [0, 0], "angle": 0.6,
+                    "damping": damping}],
+        "simulation": {"dt": 0.01, "duration": 1.0, "stepping": "event", **simulation}}
+
+
+DAMPING = "joints/pin/damping"
+
+
+def swing(damping: float, sigma: float, seed: int) -> dict[str, Any]:
+    run = tangible.simulate(pendulum(damping))
+    noise = sigma * np.random.default_rng(seed).normal(size=len(run.times))
+    return {"time": run.times, "angle": run["bob/angle"] + noise}
+
+
+def test_domains_keep_to_the_ranges_of_the_scene() -> None:
+    """A damping that is nearly 0 has a Gaussian that reaches below it."""
+    found = tangible.fit(pendulum(), swing(0.003, 0.01, 0), [DAMPING, "joints/pin/angle"], sigma=0.01)
+    assert 0 < found[DAMPING] < 2 * found.standard_deviations[DAMPING]
+    drawn = found.domains(2000, seed=1)
+    assert drawn[DAMPING].min() >= 0 and len(np.unique(drawn[DAMPING])) == 2000
+    # Half of a Gaussian about a mean m: the draws are of the Gaussian above 0.
+    from scipy.stats import truncnorm
+
+    mean, deviation = found[DAMPING], found.standard_deviations[DAMPING]
+    expected = truncnorm(-mean / deviation, np.inf, mean, deviation).mean()
+    assert drawn[DAMPING].mean() == pytest.approx(expected, abs=4 * deviation / np.sqrt(2000))
+    assert np.isfinite(tangible.Simulation(pendulum(), batch=50, domains=drawn).reset(seed=0)).all()
+    # A range of its own, of a scaled parameter.
+    scaled = [{"name": "d", "initial": 0.01, "upper": 0.05, "sets": [{"path": "joints/p*/damping", "scale": 0.1}]}]
+    one = tangible.fit(pendulum(), swing(0.0045, 0.01, 1), scaled, sigma=0.01, on_failure="return").domains(500)
+    assert list(one) == ["joints/p*/damping"] and one["joints/p*/damping"].max() <= 0.005
+    assert one["joints/p*/damping"].min() >= 0
+
+
+def test_domains_of_parameters_at_their_bounds_are_the_estimate() -> None:
+    found = tangible.fit(pendulum(), swing(0.0, 0.01, 3), [DAMPING], sigma=0.01, on_failure="return")
+    assert found[DAMPING] == 0.0
+    assert found.domains(4)[DAMPING].tolist() == [0.0] * 4
+
+
+def test_domains_of_parameters_that_add() -> None:
+    table = swing(0.05, 0.001, 1)
+    sets = [{"path": "joints/*/damping", "add": True}]
+    found = tangible.fit(pendulum(0.03), table, [{"name": "extra", "initial": 0.01, "sets": sets}], sigma=0.001)
+    assert found["extra"] == pytest.approx(0.02, abs=0.001)
+    drawn = found.domains(1000, seed=2)
+    assert list(drawn) == [DAMPING]
+    assert drawn[DAMPING].mean() == pytest.approx(found.scene[DAMPING], abs=1e-4)
+    assert drawn[DAMPING].std() == pytest.approx(found.standard_deviations["extra"], rel=0.1)
+    # With one that sets the number.
+    both = tangible.fit(pendulum(), table, [
+        {"name": "twice", "initial": 0.02, "sets": [{"path": DAMPING, "scale": 2, "offset": 0.005}]},
+        {"name": "extra", "initial": 0.01, "sets": sets, "prior": {"gaussian": {"mean": 0.02, "sigma": 1e-5}}},
+    ], sigma=0.001)
+    assert both.domains(1000)[DAMPING].mean() == pytest.approx(both.scene[DAMPING], abs=1e-4)
+    assert both.scene[DAMPING] == pytest.approx(0.05, abs=0.001)
+
+
+def test_domains_say_what_they_have_not() -> None:
+    two = pendulum()
+    two["bodies"].append({"name": "tip", "mass": 0.5, "inertia": 0.01, "position": [0, -1]})
+    two["joints"].append({"name": "elbow", "type": "revolute", "bodies": ["tip", "bob"], "anchor": [0, -0.7]})
+    run = tangible.simulate(two)
+    found = tangible.fit(
+        two, {"time": run.times, "bob/x": run["bob/x"], "tip/x": run["tip/x"]}, ["links/arm/length", DAMPING],
+        sigma=0.001, links={"arm": {"from": "pin", "to": "elbow"}})
+    with pytest.raises(ValueError, match="^domains: expected parameters that are numbers .*, got links/arm/length,"):
+        found.domains(3)
+    for wrong, said in [((0,), "count: expected a whole number >= 1, got 0"), ((3, -1), "seed: expected a whole")]:
+        with pytest.raises(ValueError, match=said):
+            found.domains(*wrong)
+    bare = tangible.FitResult({"status": "failed", "message": "", "parameters": []}, "")
+    with pytest.raises(ValueError, match="domains: expected a fit with an estimate, got one that is failed"):
+        bare.domains(3)
+
+
+def test_what_is_masked_was_not_measured() -> None:
+    table = swing(0.05, 0.001, 1)
+    spoiled = table["angle"].copy()
+    spoiled[20:40] = 99.0
+    blank = np.where(spoiled > 10, np.nan, spoiled)
+    expected = tangible.fit(pendulum(), {**table, "angle": blank}, [DAMPING], sigma=0.001)
+    masked = np.ma.masked_greater(spoiled, 10)
+    for angle in (masked, masked.astype(object)):
+        found = tangible.fit(pendulum(), {**table, "angle": angle}, [DAMPING], sigma=0.001)
+        assert found.estimates == expected.estimates
+    residuals = tangible.Residuals(pendulum(), {**table, "angle": masked}, [DAMPING], sigma=0.001)
+    assert len(residuals([0.05])) == len(table["time"]) - 20
+    whole = np.ma.masked_array(np.arange(101), np.arange(101) > 1)
+    assert len(tangible.Residuals(pendulum(), {**table, "angle": whole}, [DAMPING], sigma=0.001)([0.05])) == 2
+    with pytest.raises(ValueError, match="data: time: expected finite numbers, got NaN"):
+        tangible.fit(pendulum(), {**table, "time": np.ma.masked_less(table["time"], 0.1)}, [DAMPING], sigma=0.001)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda x: x > 0, "bool"), (lambda x: x + 1j, "complex128"), (lambda x: list(x > 0), "bool"),
+        (lambda x: [True, *x[1:]], "bool"), (lambda x: np.array([1j, *x[1:]], dtype=object), "complex"),
+        (lambda x: [np.datetime64("2020-01-01")] * len(x), r"datetime64\[D\]"),
+    ],
+)
+def test_what_is_no_real_number_is_refused(change: Any, said: str) -> None:
+    table = swing(0.05, 0.001, 1)
+    changed = change(table["angle"])
+    if isinstance(changed, list) and isinstance(changed[0], bool):
+        changed = np.array(changed, dtype=object)
+    with pytest.raises(TypeError, match=f"^data: angle: expected real numbers, got {said}$"):
+        tangible.fit(pendulum(), {**table, "angle": changed}, [DAMPING], sigma=0.001)
+    with pytest.raises(ValueError, match="^data: angle: expected finite numbers, or NaN"):
+        tangible.fit(pendulum(), {**table, "angle": table["angle"] / 0.0}, [DAMPING], sigma=0.001)
+
+
+def without_seconds(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: without_seconds(item) for key, item in value.items() if "seconds" not in key}
+    return [without_seconds(item) for item in value] if isinstance(value, list) else value
+
+
+def test_equal_calls_have_equal_results() -> None:
+    table = swing(0.05, 0.001, 1)
+    one, other = (tangible.fit(pendulum(), table, [DAMPING], sigma=0.001) for _ in range(2))
+    assert without_seconds(one.data) == without_seconds(other.data)
+    assert one.data["residuals_by_series"][0]["file"] == "data"
+    runs = {"slow": table, "fast": {"data": table, "weight": 2.0}}
+    named = tangible.fit(pendulum(), None, [DAMPING], sigma=0.001, recordings=runs)
+    assert [s["file"] for s in named.data["residuals_by_series"]] == ["recordings/slow", "recordings/fast"]
+    listed = tangible.fit(pendulum(), None, [DAMPING], sigma=0.001, recordings=[table])
+    assert listed.data["residuals_by_series"][0]["file"] == "recordings/0"
+    whole = tangible.fit({"scene": pendulum(), "parameters": [DAMPING],
+                          "observations": [{"data": {"body": "bob", **table}, "sigma": 0.001}]})
+    assert whole.data["residuals_by_series"][0]["file"] == "observations/0"
+    for found in (one, named, listed, whole):
+        assert "tangible_" not in json.dumps(found.data) + found.report() + repr(found.predictions)
+    with pytest.raises(tangible.TangibleError, match="^recordings/fast: line 2: body: .*bib"):
+        tangible.fit(pendulum(), None, [DAMPING], sigma=0.001,
+                     recordings={"slow": table, "fast": {"time": [0.0], "bib/x": [0.0]}})
+
+
+def test_a_kink_is_warned_of_once() -> None:
+    """A block that is pushed exactly at the limit of its friction."""
+    block = {
+        "bodies": [
+            {"name": "block", "shape": {"box": {"size": [0.4, 0.2]}}, "mass": 2.0, "position": [0, 0.1]},
+            {"name": "floor", "static": True, "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
+        "pairs": [{"bodies": ["block", "floor"], "friction": 0.3}],
+        "forces": [{"name": "push", "body": "block", "force": [0.3 * 2 * 9.81, 0]}],
+        "simulation": {"dt": 0.01, "duration": 0.5, "stepping": "event"}}
+    times = np.linspace(0, 0.5, 26)
+    with pytest.warns(tangible.TangibleWarning) as caught:
+        found = tangible.fit(block, {"time": times, "x": 0 * times}, ["bodies/block/position/x"], sigma=0.001)
+    assert found.certificate is not None and found.certificate.kind == "near_kink"
+    for lines in (found.warnings, [str(warning.message) for warning in caught]):
+        assert sum("trustworthy" in line for line in lines) == 1
+
+
+def test_tables_of_pandas() -> None:
+    pandas = pytest.importorskip("pandas")
+    table = swing(0.05, 0.001, 1)
+
+    def estimate(data: Any) -> float:
+        return tangible.fit(pendulum(), data, [DAMPING], sigma=0.001)[DAMPING]
+
+    angle = np.where(np.arange(101) % 5 == 0, np.nan, table["angle"])
+    expected = estimate({**table, "angle": angle})
+    nullable = pandas.array([None if np.isnan(x) else x for x in angle], dtype="Float64")
+    assert estimate(pandas.DataFrame({**table, "angle": nullable})) == expected
+    assert estimate({**table, "angle": nullable}) == expected
+    assert estimate({**table, "angle": pandas.Series(nullable).astype(object)}) == expected
+    since = pandas.to_timedelta(table["time"], unit="s")
+    full = estimate(table)
+    for times in (since, since.to_numpy(), [x.to_pytimedelta() for x in since]):
+        assert estimate({"time": times, "angle": table["angle"]}) == pytest.approx(full, abs=1e-12)
+    indexed = pandas.DataFrame({"angle": table["angle"]}, index=pandas.Index(since, name="time"))
+    assert estimate(indexed) == pytest.approx(full, abs=1e-12)
+    with pytest.raises(ValueError, match=r'^data: expected a column time, got angle; .*rename_axis\("time"\)$'):
+        estimate(pandas.DataFrame({"angle": table["angle"]}, index=table["time"]))
+    with pytest.raises(TypeError, match="^data: time: expected s or time differences, got dates .*: subtract"):
+        estimate({"time": pandas.Timestamp("2020-01-01") + since, "angle": table["angle"]})
+    with pytest.raises(TypeError, match=r"^recordings: expected a list of tables .*, got one table: \[table\]$"):
+        tangible.fit(pendulum(), None, [DAMPING], sigma=0.001, recordings=pandas.DataFrame(table))
+
+
+def test_names_of_parameters_are_listed() -> None:
+    found = tangible.fit(pendulum(), swing(0.05, 0.001, 1), [DAMPING], sigma=0.001)
+    with pytest.raises(KeyError, match=f"nope: expected one of {DAMPING}"):
+        found["nope"]
+    assert tangible.TangibleError.__doc__ is not None and "expected" in tangible.TangibleError.__doc__

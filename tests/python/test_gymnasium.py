@@ -166,3 +166,17 @@ def test_a_scene_of_ones_own(adapter: Any) -> None:
             break
     # It falls 2 cm in 0.064 s.
     assert steps == 7 and terminated and not truncated
+
+
+def test_wrong_arguments_are_said(adapter: Any) -> None:
+    push = ["forces/push/force/x"]
+    good: dict[str, Any] = {"low": -1, "high": 1, "reward": lambda *_: 0.0}
+    for keys, said in [
+        ({"steps": 1.5}, "^steps: expected a whole number >= 1, got 1.5$"),
+        ({"duration": "1"}, "^duration: expected a time > 0 in s, got '1'$"),
+        ({"reward": 3}, "^reward: expected a function, got 3$"),
+        ({"observe": 3}, "^observe: expected a function or None, got 3$"),
+        ({"low": "a"}, "^low: expected real numbers"),
+    ]:
+        with pytest.raises(TypeError, match=said):
+            adapter.SceneEnv(ball(), push, **{**good, **keys})

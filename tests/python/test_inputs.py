@@ -156,6 +156,16 @@ def test_a_saved_scene_takes_its_signals_along(tmp_path: Path) -> None:
     assert np.array_equal(tangible.simulate(scene).poses, expected)
 
 
+def test_what_is_masked_is_not_taken_for_a_number() -> None:
+    one = np.ma.masked_array([1.2, 9e9], [False, True])
+    rollout = tangible.Rollout(ball(), ["bodies/ball/mass"])
+    with pytest.raises(ValueError, match="^parameters: expected numbers, got an array that masks some$"):
+        rollout(one[1:])
+    assert np.array_equal(rollout(one[:1]), rollout([1.2]))
+    with pytest.raises(tangible.TangibleError, match="^scene: /gravity/1: expected a finite number, got NaN$"):
+        tangible.Scene(gravity=one)
+
+
 def test_adding_is_linear() -> None:
     """Eight hundred bodies took 1.6 s when each one copied those before it."""
     def seconds(count: int) -> float:

@@ -90,6 +90,30 @@ def test_fits_and_residuals(way: Callable[[Any], Any]) -> None:
     assert str(way(tangible.TangibleError("wrong"))) == "wrong"
 
 
+@pytest.mark.parametrize("way", WAYS)
+def test_simulations_before_their_first_step(way: Callable[[Any], Any], scene: dict[str, Any]) -> None:
+    def made() -> tangible.Simulation:
+        return tangible.Simulation(
+            scene, ["forces/push/force/x"], batch=3, noise={"ball/x": 0.1, "bodies/ball/restitution": 0.01},
+            domains={"bodies/ball/mass": [1.0, 2.0]}, on_failure="nan", threads=1)
+
+    fresh = way(made())
+    assert np.isnan(fresh.state).all() and repr(fresh) == repr(made())
+    assert np.array_equal(fresh.reset(seed=3), made().reset(seed=3))
+    simulation = made()
+    simulation.reset(seed=3, rows=[0, 2])
+    other = way(simulation)
+    assert np.array_equal(other.state, simulation.state, equal_nan=True) and np.isnan(other.state[1]).all()
+    for one in (simulation, other):
+        one.step([0.5], steps=50)
+    assert np.array_equal(other.state, simulation.state, equal_nan=True) and not np.isnan(other.state[[0, 2]]).any()
+    # They are two: one that is reset leaves the other.
+    other.reset(seed=3)
+    assert simulation.steps.tolist() != other.steps.tolist()
+    with pytest.raises(TypeError, match="^Simulation: expected one before its first step, .* pickle its `scene` and"):
+        way(simulation)
+
+
 def test_a_layer_can_be_saved(scene: dict[str, Any], tmp_path: Path) -> None:
     torch = pytest.importorskip("torch")
     from tangible.torch import RolloutLayer

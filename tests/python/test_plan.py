@@ -189,7 +189,7 @@ def test_mistakes_are_one_line(change: dict[str, Any], said: str) -> None:
 def test_mistakes_of_arguments() -> None:
     with pytest.raises(tangible.TangibleError, match="^nowhere.json: cannot be read"):
         tangible.plan("nowhere.json")
-    with pytest.raises(ValueError, match="threads: expected a number from 0 to 256, got -1"):
+    with pytest.raises(ValueError, match="threads: expected a whole number from 0 to 256, got -1"):
         tangible.plan(balance(), threads=-1)
     with pytest.raises(ValueError, match="on_failure: expected raise or return"):
         tangible.plan(balance(), on_failure="x")

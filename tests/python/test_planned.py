@@ -51,7 +51,7 @@ def test_mistakes_of_plans_are_said() -> None:
         ({"controls": {"bodies/ball/mass": 1.0}}, "expected forces/NAME/force/x"),
         ({"initial_state": [1.0, 2.0]}, r"initial_state: expected shape \(6,\), got \(2,\)"),
         ({"initial_state": {"x": 1.0}}, "expected one of ball/x"),
-        ({"initial_state": {"ball/x": np.nan}}, "initial_state: expected finite numbers"),
+        ({"initial_state": {"ball/x": np.nan}}, "initial_state ball/x: expected a finite number, got NaN"),
     ]:
         with pytest.raises(ValueError, match=said):
             tangible.simulate(ball(), **wrong)

@@ -349,3 +349,19 @@ def test_nothing_is_recorded_without_a_derivative_to_take(monkeypatch: pytest.Mo
     assert rollout(function, p.detach().float()).dtype == torch.float32
     with pytest.raises(TypeError):
         rollout(function, p)
+
+
+def test_wrong_arguments_are_said() -> None:
+    names = ["bodies/ball/mass"]
+    for keys, said in [
+        ({"positive": 3}, "^positive: expected a list of paths, got 3$"),
+        ({"bounds": [1]}, r"^bounds: expected a dict \{path: \(low, high\)\}, got list$"),
+        ({"bounds": {names[0]: 1}}, rf"^bounds: {names[0]}: expected \(low, high\), got 1$"),
+        ({"smoothing": 3}, "^smoothing: expected a Smoothing or None, got 3$"),
+    ]:
+        with pytest.raises(TypeError, match=said):
+            RolloutLayer(ball(), names, **keys)
+    with pytest.raises(ValueError, match="^on_failure: expected raise or nan, got x$"):
+        RolloutLayer(ball(), names, on_failure="x")
+    with pytest.raises(TypeError, match="^function: expected a tangible.Rollout, got int$"):
+        rollout(3)  # type: ignore[arg-type]

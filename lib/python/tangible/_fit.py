@@ -8,6 +8,7 @@ import io
 import json
 import math
 import os
+import re
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
@@ -19,10 +20,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _core, _executor
 from ._certificate import Certificate
+from ._plain import choice, file_name, flag, function, number, plain, seed_of, text, whole
 from ._plain import paths as names
-from ._plain import plain
 from ._problem import Problem, make, of_data, text_of
-from ._rollout import floats
+from ._rollout import finite, floats
 from ._scene import Scene
 from ._warning import warn
 
@@ -48,8 +49,8 @@ def _problem(
     keys: Mapping[str, Any],
 ) -> Problem:
     if data is not None or recordings is not None:
-        whole = of_data(problem, data, parameters, sigma, points, recordings, keys)
-        return make(whole, folder, initial)
+        whole_problem, labels = of_data(problem, data, parameters, sigma, points, recordings, keys)
+        return make(whole_problem, folder, initial, labels)
     if isinstance(problem, Scene):
         raise TypeError("data: expected a dict of arrays or a DataFrame with a scene, got None")
     given = {"parameters": parameters, "sigma": sigma, "points": points, **keys}
@@ -109,13 +110,19 @@ class Residuals:
     def __setstate__(self, problem: Problem) -> None:
         self._open(problem)
 
+    def _numbers(self, parameters: ArrayLike) -> Floats:
+        array = floats(parameters, "parameters")
+        if array.shape == (len(self.names),):
+            finite(array[None], "", self.names, False)
+        return array
+
     def __call__(self, parameters: ArrayLike) -> Floats:
         """The residuals, shape (R,)."""
-        return self._core.evaluate(floats(parameters, "parameters"), False)[0]
+        return self._core.evaluate(self._numbers(parameters), False)[0]
 
     def jacobian(self, parameters: ArrayLike) -> Floats:
         """Their derivatives with respect to the parameters, shape (R, P)."""
-        found = self._core.evaluate(floats(parameters, "parameters"), True)[1]
+        found = self._core.evaluate(self._numbers(parameters), True)[1]
         assert found is not None
         return found
 
@@ -126,6 +133,89 @@ def _arrays(columns: Mapping[str, Any]) -> dict[str, Any]:
         key: np.array([np.nan if x is None else x for x in value]) if isinstance(value, list) else value
         for key, value in columns.items()
     }
+
+
+# Rounding of linear functions of parameters, as a share of their largest term.
+_ROUNDING = 1e-12
+# So many draws for each one that is asked for, at most.
+_DRAWS = 1000
+_OF_SCENES = ("bodies/", "joints/", "springs/", "forces/", "pairs/", "gravity/")
+
+
+class _Domains:
+    """Values of a scene's numbers as functions of a fit's parameters p: scale p + offset of the
+    parameter that sets a number. Where others add to numbers, each is its value at the estimate p_0
+    and scale (p - p_0) of all that set it or add to it."""
+
+    def __init__(
+        self, scene: Scene, names: Sequence[str], estimates: Mapping[str, float],
+        parameters: Sequence[Any], ranges: Mapping[str, tuple[float, float]],
+    ) -> None:
+        self.scene = scene
+        self.estimates = np.array([estimates[name] for name in names])
+        limits = [ranges.get(name, (-math.inf, math.inf)) for name in names]
+        self.low, self.high = (np.array([limit[side] for limit in limits]) for side in (0, 1))
+        sets: list[tuple[int, dict[str, Any]]] = []
+        for entry in parameters:
+            given = {"path": entry} if isinstance(entry, str) else entry
+            name = given.get("name", given.get("path"))
+            if name in names:
+                listed = given.get("sets", [{"path": given.get("path")}])
+                sets += [(names.index(name), one) for one in listed]
+        lengths = [one["path"] for _, one in sets if one["path"].startswith("links/")]
+        if lengths:
+            raise ValueError(
+                f"domains: expected parameters that are numbers of the scene, got {', '.join(lengths)}, which "
+                "moves several; write what it moves as `sets` with \"add\": true in its place"
+            )
+        sets = [(k, one) for k, one in sets if one["path"].startswith(_OF_SCENES)]
+        self.adds = any(one.get("add") for _, one in sets)
+        # (parameter, scale, offset) of each path, or of each number where some add.
+        self.terms: dict[str, list[tuple[int, float, float]]] = {}
+        for k, one in sets:
+            for path in self._numbers(one["path"]):
+                term = k, float(one.get("scale", 1.0)), float(one.get("offset", 0.0))
+                self.terms.setdefault(path, []).append(term)
+
+    def _numbers(self, path: str) -> list[str]:
+        if not self.adds:
+            return [path]
+        form = re.compile(re.escape(path).replace(r"\*", "[^/]*"))
+        return [known for known in self.scene.parameters() if form.fullmatch(known)]
+
+    def values(self, drawn: Floats) -> tuple[dict[str, Floats], NDArray[np.bool_]]:
+        """The numbers, within their ranges, and of which rows all were, to rounding."""
+        found: dict[str, Floats] = {}
+        inside = ((drawn >= self.low) & (drawn <= self.high)).all(axis=1)
+        for path, terms in self.terms.items():
+            begin = self.scene[path] if self.adds else 0.0
+            column = np.full(len(drawn), begin)
+            size = abs(begin)
+            for k, scale, offset in terms:
+                column += scale * (drawn[:, k] - self.estimates[k]) if self.adds else scale * drawn[:, k] + offset
+                size = max(size, abs(scale * self.estimates[k]), abs(offset))
+            found[path] = np.clip(column, *self.scene.range(path))
+            inside &= np.abs(found[path] - column) <= _ROUNDING * size
+        return found, inside
+
+    def gaussian(self, covariance: Floats, count: int, random: np.random.Generator) -> Floats:
+        """Draws of the parameters, shape (count, P), within all ranges."""
+        known = np.isfinite(np.diag(covariance))
+        if not known.any():
+            return np.tile(self.estimates, (count, 1))
+        kept: list[Floats] = []
+        for _ in range(_DRAWS):
+            drawn = np.tile(self.estimates, (count, 1))
+            drawn[:, known] = random.multivariate_normal(
+                self.estimates[known], covariance[np.ix_(known, known)], size=count, method="eigh"
+            )
+            kept.append(drawn[self.values(drawn)[1]])
+            if sum(map(len, kept)) >= count:
+                return np.concatenate(kept)[:count]
+        raise ValueError(
+            f"domains: expected a Gaussian of estimates and covariance within the ranges, got {sum(map(len, kept))} "
+            f"of {count * _DRAWS} draws inside; draws of the posterior, fit(posterior=N), keep to them"
+        )
 
 
 class FitResult:
@@ -155,10 +245,12 @@ class FitResult:
         scenes: Iterable[_core.Scene] = (),
         parameters: Sequence[Any] = (),
         draws: str = "",
+        ranges: Mapping[str, tuple[float, float]] | None = None,
     ) -> None:
         self.data = data
         self._page = page
         self._parameters = list(parameters)
+        self._ranges = dict(ranges or {})
         self.status: str = data["status"]
         self.message: str = data["message"]
         found = data.get("certificate")
@@ -194,40 +286,35 @@ class FitResult:
         """Scenes that the observations leave possible, for `Simulation(domains=...)`.
 
         From the draws of the posterior, if `posterior` asked for them, each at most once more often
-        than another; else from the Gaussian of estimates and covariance, each kept within its range:
-        {path of the scene: shape (count,)}. Parameters of single recordings are left out.
+        than another; else from the Gaussian of estimates and covariance, drawn anew where a parameter
+        leaves its range or a number of the scene its own (`Scene.range`): {path of the scene: shape
+        (count,), SI units}. A parameter without a standard deviation, such as one at its bound, has its
+        estimate in each row. Parameters of single recordings are left out, which have their estimates
+        of the first, and those of instruments and points, which no scene has.
+
+        Args:
+            count: Number of scenes, at least 1.
+            seed: Of the draws, a whole number >= 0.
+
+        Raises:
+            ValueError: A fit without an estimate; one of a length of `links`; a Gaussian of which
+                less than a thousandth is within the ranges; a number that is not allowed.
+            TypeError: What is no whole number.
         """
-        names = self.names
-        random = np.random.default_rng(seed)
+        count, random = whole(count, "count", 1), np.random.default_rng(seed_of(seed))
+        if not self.scenes:
+            raise ValueError(f"domains: expected a fit with an estimate, got one that is {self.status}")
+        drawer = _Domains(self.scene, self.names, self.estimates, self._parameters, self._ranges)
         if self.draws:
-            table = np.column_stack([self.draws[name] for name in names])
+            table = np.column_stack([self.draws[name] for name in self.names])
             rows = [random.permutation(len(table)) for _ in range(-(-count // len(table)))]
-            drawn = table[np.concatenate([np.zeros(0, dtype=np.intp), *rows])[:count]]
-        else:
-            mean = np.array([self.estimates[name] for name in names])
-            covariance = self.covariance
-            known = np.isfinite(np.diag(covariance))
-            drawn = np.tile(mean, (count, 1))
-            drawn[:, known] = random.multivariate_normal(
-                mean[known], covariance[np.ix_(known, known)], size=count, method="eigh"
-            )
-        values: dict[str, Floats] = {}
-        for entry in self._parameters:
-            given = {"path": entry} if isinstance(entry, str) else entry
-            name = given.get("name", given.get("path"))
-            if name not in names:
-                continue
-            low = -math.inf if given.get("lower") is None else float(given["lower"])
-            high = math.inf if given.get("upper") is None else float(given["upper"])
-            column = np.clip(drawn[:, names.index(name)], low, high)
-            for one in given.get("sets", [{"path": given.get("path")}]):
-                path = str(one["path"])
-                if path.startswith(("bodies/", "joints/", "springs/", "forces/", "pairs/", "gravity/")):
-                    values[path] = one.get("scale", 1.0) * column + one.get("offset", 0.0)
-        return values
+            return drawer.values(table[np.concatenate(rows)[:count]])[0]
+        return drawer.values(drawer.gaussian(self.covariance, count, random))[0]
 
     def __getitem__(self, name: str) -> float:
         """The estimate of a parameter."""
+        if text(name, "name", "the name of a parameter") not in self.estimates:
+            raise KeyError(f"{name}: expected one of {', '.join(self.estimates) or 'none'}")
         return self.estimates[name]
 
     @property
@@ -240,8 +327,9 @@ class FitResult:
 
         The robust one comes from the residuals as they are; the other one trusts the stated sigma.
         """
+        robust = flag(robust, "robust")
         for parameter in self.data["parameters"]:
-            if parameter["name"] == name:
+            if parameter["name"] == text(name, "name", "the name of a parameter"):
                 found = parameter["confidence_95_robust" if robust else "confidence_95"]
                 return None if found is None else (float(found[0]), float(found[1]))
         raise KeyError(f"{name}: expected one of {', '.join(self.names)}")
@@ -260,8 +348,12 @@ class FitResult:
     def warnings(self) -> list[str]:
         """What `tangible-fit` warns of, such as intervals that mean little."""
         lines = [str(line) for line in self.data.get("warnings") or []]
-        if self.certificate is not None and self.certificate.verdict_of_map != "trustworthy":
-            lines.append(f"not trustworthy at the estimate: {self.certificate}")
+        found = self.certificate
+        # Where the fit has certified its own estimate, the verdict stands among its lines.
+        if found is not None and found.verdict_of_map != "trustworthy" and not any(
+            found.verdict in line for line in lines
+        ):
+            lines.append(f"not trustworthy at the estimate: {found}")
         return lines
 
     @property
@@ -321,7 +413,7 @@ class FitResult:
     def report(self, file: str | os.PathLike[str] | None = None) -> str:
         """The report as a page; written to a file if one is named."""
         if file is not None:
-            Path(file).write_text(self._page, encoding="utf-8")
+            Path(file_name(file, "file")).write_text(self._page, encoding="utf-8")
         return self._page
 
     def _repr_html_(self) -> str:
@@ -342,8 +434,7 @@ class FitResult:
         """
         import matplotlib.pyplot as plt
 
-        if what not in ("data", "residuals", "cost"):
-            raise ValueError(f"what: expected data, residuals or cost, got {what}")
+        choice(what, "what", "data", "residuals", "cost")
         axes: Axes = ax if ax is not None else plt.subplots()[1]
         if what == "cost":
             axes.semilogy([iteration["cost"] for iteration in self.data["iterations"]], marker="o")
@@ -429,9 +520,8 @@ def _sampling(
         ("posterior_warm_up", warm_up, 0, 1_000_000), ("posterior_seed", seed, 0, 2**31 - 1),
         ("posterior_temperatures", temperatures, 1, 32),
     ):
-        if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not low <= value <= high:
-            raise ValueError(f"{name}: expected a whole number from {low} to {high}, got {value}")
-    if not 0.01 <= target <= 0.999:
+        whole(value, name, low, high, what=f"a whole number from {low} to {high}")
+    if not 0.01 <= number(target, "posterior_target", what="a number from 0.01 to 0.999") <= 0.999:
         raise ValueError(f"posterior_target: expected a number from 0.01 to 0.999, got {target}")
     return int(draws), int(chains), int(warm_up), float(target), int(seed), int(temperatures)
 
@@ -535,7 +625,8 @@ def fit(
         data: What was measured: a dict of arrays of one length, or a DataFrame of pandas. Columns
             are `time` (s; a DataFrame's index may be it) and either `body` or `point` beside `x`,
             `y` (m), `angle` (rad), ..., or wide ones like "ball/x". A table of the one moving body
-            needs no names. NaN is what was not measured.
+            needs no names. NaN, None, pandas' NA and what a masked array masks is what was not
+            measured. Time differences (timedelta) are times.
         parameters: What is to be found: paths, or dicts as in a fit file, or {path or name: initial
             value or such a dict}.
         sigma: Standard deviation of what was measured: a number, or {"x": m, "angle": rad, ...}.
@@ -581,13 +672,13 @@ def fit(
     Warns:
         TangibleWarning: Of what `FitResult.warnings` lists.
     """
-    if on_failure not in ("raise", "return"):
-        raise ValueError(f"on_failure: expected raise or return, got {on_failure}")
-    if max_iterations < 1:
-        raise ValueError(f"max_iterations: expected a number >= 1, got {max_iterations}")
-    if predict_from is not None and not math.isfinite(predict_from):
-        raise ValueError(f"predict_from: expected a time in s, got {predict_from}")
-
+    choice(on_failure, "on_failure", "raise", "return")
+    max_iterations = whole(max_iterations, "max_iterations", 1)
+    end = math.inf if predict_from is None else number(predict_from, "predict_from", what="a time in s")
+    function(callback, "callback")
+    progress = flag(progress, "progress")
+    missing, discretisation_check = flag(missing, "missing"), flag(discretisation_check, "discretisation_check")
+    kept = "" if checkpoint is None else file_name(checkpoint, "checkpoint")
     _executor.check(executor)
     if executor is not None and checkpoint is not None:
         raise ValueError("checkpoint: not with executor, whose workers keep none")
@@ -603,23 +694,23 @@ def fit(
         posterior_temperatures,
     )
     made = _problem(problem, data, parameters, sigma, points, recordings, folder, initial, keys)
-    end = math.inf if predict_from is None else float(predict_from)
     profiles = names(profile, "profile")
     candidates = ("", "")
     if isinstance(design, Mapping):
         candidates = (json.dumps(plain(design, "design")), "design")
     elif design is not None:
-        candidates = (text_of(os.fspath(design)), os.fspath(design))
+        file = file_name(design, "design", "a file of candidates or a dict of its JSON")
+        candidates = (text_of(file), file)
     try:
         starts_done, profiles_done, chains_done = _parts(
             executor, made, max_iterations, end, profiles, sampling
         )
-        with made.read() as core:
-            text, page, predictions, scenes, draws = core.run(
+        with made.open(_core.Fit) as (core, named):
+            found, page, predictions, scenes, draws = core.run(
                 max_iterations,
                 end,
                 discretisation_check,
-                "" if checkpoint is None else os.fspath(checkpoint),
+                kept,
                 told if progress or callback is not None else None,
                 profiles,
                 starts_done,
@@ -629,11 +720,13 @@ def fit(
                 sampling,
                 chains_done,
             )
+            found, page, predictions = named(found), named(page), named(predictions)
+            ranges = {name: (low, high) for name, (_, low, high) in zip(core.names, core.ranges().tolist())}
     finally:
         if progress:
             print(file=sys.stderr)
     listed = json.loads(made.text).get("parameters", [])
-    result = FitResult(json.loads(text), page, predictions, scenes, listed, draws)
+    result = FitResult(json.loads(found), page, predictions, scenes, listed, draws, ranges)
     if result.status != "converged" and on_failure == "raise":
         raise _core.TangibleError(f"{result.status}: {result.message}")
     warn(result.warnings)

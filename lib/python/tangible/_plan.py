@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 
 from . import _core
 from ._certificate import Certificate
-from ._plain import plain
-from ._problem import Maker, Problem, text_of
+from ._plain import choice, file_name, flag, function, mapping, number, plain, text, whole
+from ._problem import Maker, Problem, object_of, text_of
+from ._rollout import MOST_THREADS, floats
 from ._scene import Scene, SceneLike
 from ._trajectory import UNITS, Trajectory, display, simulate
 from ._warning import warn
@@ -62,7 +63,7 @@ class _Controlled:
 
     def __getitem__(self, name: str) -> Floats:
         """A coordinate over `times`, "rod/angle", or a control of each step by its path."""
-        if name in self.controls:
+        if text(name, "name", "the path of a control or the name of a coordinate") in self.controls:
             return self.controls[name]
         if name in self.names:
             return np.asarray(self.states[:, self.names.index(name)])
@@ -71,11 +72,11 @@ class _Controlled:
     def save(self, file: str | os.PathLike[str]) -> None:
         """Writes the controls as `tangible-control --plan` does: a problem with
         `"initial": {"file": ...}` goes on from them."""
-        Path(file).write_text(self._table, encoding="utf-8")
+        Path(file_name(file, "file")).write_text(self._table, encoding="utf-8")
 
     def to_csv(self, file: str | os.PathLike[str]) -> None:
         """Writes the motion as a trajectory file, as `tangible-control --trajectory` does."""
-        Path(file).write_text(self._trajectory, encoding="utf-8")
+        Path(file_name(file, "file")).write_text(self._trajectory, encoding="utf-8")
 
     def html(self) -> str:
         """The animated page, as `tangible-control --view` writes it."""
@@ -266,11 +267,11 @@ def _table(initial: Any, problem: Problem) -> str:
     """Controls of each step as a file that `initial` names."""
     if isinstance(initial, _Controlled):
         return initial._table
-    with problem.open(_core.Control) as core:
+    with problem.open(_core.Control) as (core, _):
         dt, paths = core.dt, core.paths
     if sorted(initial) != sorted(paths):
         raise ValueError(f"initial: expected controls of {', '.join(paths)}, got {', '.join(map(str, initial))}")
-    columns = [np.asarray(initial[path], dtype=np.float64) for path in paths]
+    columns = [floats(initial[path], f"initial {path}") for path in paths]
     for path, column in zip(paths, columns):
         if column.ndim != 1 or column.shape != columns[0].shape:
             raise ValueError(f"initial: {path}: expected a number for each step, got shape {column.shape}")
@@ -283,18 +284,21 @@ def _table(initial: Any, problem: Problem) -> str:
 def _make(problem: ProblemLike, folder: str | os.PathLike[str], initial: Initial | None) -> Problem:
     """A problem from its file, or from its JSON, in which a scene and controls may stand."""
     maker = Maker()
+    if initial is not None and not isinstance(initial, _Controlled):
+        mapping(initial, "initial", "a plan or a dict {path: a number for each step}")
     if isinstance(problem, Mapping):
         data = dict(problem)
-        name = str(Path(folder) / "plan")
+        name = str(Path(file_name(folder, "folder", "a folder's name")) / "plan")
         if isinstance(data.get("scene"), (Scene, Mapping)):
             scene = Scene.of(data["scene"])
             data["scene"] = maker.add("scene", scene.core.to_whole_json(), scene.name)
     else:
-        name = os.fspath(problem)
-        text = text_of(name)
-        if initial is None:
-            return Problem(text, name, {}, {})
-        data = json.loads(text)
+        name = file_name(problem, "problem", "a file of a problem or a dict of its JSON")
+        written = text_of(name)
+        read = object_of(written)
+        if initial is None or read is None:
+            return Problem(written, name, {}, {})
+        data = read
     own = data.pop("initial", None)
     begins = own if initial is None else initial
     if isinstance(begins, _Controlled) or (isinstance(begins, Mapping) and "file" not in begins):
@@ -305,11 +309,11 @@ def _make(problem: ProblemLike, folder: str | os.PathLike[str], initial: Initial
     return Problem(json.dumps(plain(data, "plan")), name, maker.files, maker.said)
 
 
-def _check(threads: int, on_failure: str) -> None:
-    if on_failure not in ("raise", "return"):
-        raise ValueError(f"on_failure: expected raise or return, got {on_failure}")
-    if not 0 <= threads <= 256:
-        raise ValueError(f"threads: expected a number from 0 to 256, got {threads}")
+def _check(threads: int, on_failure: str, callback: Callback | None, progress: bool) -> int:
+    choice(on_failure, "on_failure", "raise", "return")
+    function(callback, "callback")
+    flag(progress, "progress")
+    return whole(threads, "threads", 0, MOST_THREADS)
 
 
 def _tell(line: str, said: dict[str, Any], progress: bool, callback: Callback | None) -> None:
@@ -356,7 +360,7 @@ def plan(
     Warns:
         TangibleWarning: Of what `Plan.warnings` lists.
     """
-    _check(threads, on_failure)
+    threads = _check(threads, on_failure, callback, progress)
     began = time.perf_counter()
 
     def told(start: int, iteration: int, cost: float, gradient: float, step: float) -> None:
@@ -367,7 +371,7 @@ def plan(
 
     made = _make(problem, folder, initial)
     try:
-        with made.open(_core.Control) as core:
+        with made.open(_core.Control) as (core, _):
             raw = core.plan(threads, told if progress or callback is not None else None)
     finally:
         if progress:
@@ -410,19 +414,19 @@ def mpc(
     Warns:
         TangibleWarning: Of what `MpcResult.warnings` lists.
     """
-    _check(threads, "raise")
-    if budget is not None and not (math.isfinite(budget) and budget > 0.0):
-        raise ValueError(f"budget: expected a time > 0 in s, got {budget}")
+    threads = _check(threads, "raise", callback, progress)
+    if budget is not None:
+        budget = number(budget, "budget", above=0.0, what="a time > 0 in s")
     began = time.perf_counter()
 
     def told(step: int, steps: int, cost: float) -> None:
         said = {"step": step, "steps": steps, "cost": cost, "seconds": time.perf_counter() - began}
         _tell(f"step {step + 1} of {steps}, cost {cost:.6g}", said, progress, callback)
 
-    own = None if plant is None else Scene.of(plant)
+    own = None if plant is None else Scene.of(plant, "plant")
     made = _make(problem, folder, initial)
     try:
-        with made.open(_core.Control) as core:
+        with made.open(_core.Control) as (core, _):
             raw = core.mpc(
                 None if own is None else own.core,
                 "" if own is None else own.name,

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import copy
+import html
 import json
 import os
 import tempfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from datetime import timedelta
+from numbers import Complex, Real
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -15,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _core
-from ._plain import plain
+from ._plain import file_name, mapping, number, plain, said, unmasked
 from ._scene import Scene
 
 # Columns of an observation file that are no measured coordinate.
@@ -37,27 +40,39 @@ class Problem:
     @contextlib.contextmanager
     def read(self) -> Iterator[_core.Fit]:
         """The engine's fit; files of memory exist as long as the context."""
-        with self.open(_core.Fit) as core:
+        with self.open(_core.Fit) as (core, _):
             yield core
 
     @contextlib.contextmanager
-    def open(self, read: Callable[[str, str], Core]) -> Iterator[Core]:
-        """What `read` makes of the text and name; files of memory exist as long as the context."""
+    def open(self, read: Callable[[str, str], Core]) -> Iterator[tuple[Core, Callable[[str], str]]]:
+        """What `read` makes of the text and name, and the function that has a text name files of
+        memory as messages do; they exist as long as the context."""
         if not self.files:
-            yield read(self.text, self.name)
+            yield read(self.text, self.name), str
             return
         with tempfile.TemporaryDirectory(prefix="tangible_") as folder:
             for file, text in self.files.items():
                 (Path(folder) / file).write_text(text, encoding="utf-8")
             data = json.loads(self.text)
             _place(data, folder)
-            try:
-                yield read(json.dumps(data), self.name)
-            except _core.TangibleError as error:
-                message = str(error)
+
+            def named(text: str) -> str:
                 for file, said in self.said.items():
-                    message = message.replace(f"{folder}/{file}", said)
-                raise _core.TangibleError(message) from None
+                    path = f"{folder}/{file}"
+                    # In JSON and in a page some letters are written in other ways.
+                    for before, after in ((path, said), (_in_json(path), _in_json(said)),
+                                          (html.escape(path), html.escape(said))):
+                        text = text.replace(before, after)
+                return text
+
+            try:
+                yield read(json.dumps(data), self.name), named
+            except _core.TangibleError as error:
+                raise _core.TangibleError(named(str(error))) from None
+
+
+def _in_json(text: str) -> str:
+    return json.dumps(text)[1:-1]
 
 
 def _place(data: dict[str, Any], folder: str) -> None:
@@ -73,9 +88,14 @@ def _place(data: dict[str, Any], folder: str) -> None:
 
 
 class Maker:
-    """Collects what stands in memory, as files of a problem."""
+    """Collects what stands in memory, as files of a problem.
 
-    def __init__(self) -> None:
+    Args:
+        labels: How messages name tables, by their places in the problem, where it is not by these.
+    """
+
+    def __init__(self, labels: Mapping[str, str] | None = None) -> None:
+        self.labels = dict(labels or {})
         self.files: dict[str, str] = {}
         self.said: dict[str, str] = {}
 
@@ -104,6 +124,7 @@ class Maker:
             kept = {key: value for key, value in entry.items() if key not in ("data", *values)}
             table = entry["data"] if "data" in entry else values
             label = f"{where}observations/{k}"
+            label = self.labels.get(label, label)
             for text in observation_files(table, own, list(points), label):
                 entries.append({**kept, "file": self.add("observations", text, label)})
         if given is not None and entries:
@@ -134,57 +155,124 @@ def text_of(name: str) -> str:
         return Path(name).read_text(encoding="utf-8-sig")
     except OSError as error:
         raise _core.TangibleError(f"{name}: cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise _core.TangibleError(f"{name}: cannot be read: expected UTF-8") from None
+
+
+def object_of(text: str) -> dict[str, Any] | None:
+    """The object that a problem's text is; None of another text, of which the engine says what is
+    wrong."""
+    try:
+        data = json.loads(text)
+    except ValueError:
+        return None
+    return data if isinstance(data, dict) else None
 
 
 def make(problem: Mapping[str, Any] | str | os.PathLike[str], folder: str | os.PathLike[str],
-         initial: Mapping[str, float] | None) -> Problem:
-    """A problem from a fit file, or from its JSON, in which scenes and tables may stand."""
+         initial: Mapping[str, float] | None, labels: Mapping[str, str] | None = None) -> Problem:
+    """A problem from a fit file, or from its JSON, in which scenes and tables may stand; `labels` as
+    of a `Maker`."""
+    maker = Maker(labels)
+    if initial is not None:
+        mapping(initial, "initial", "a dict {name: value}")
     if isinstance(problem, Mapping):
-        maker = Maker()
         data = plain(maker.run(dict(problem), None, ""), "fit")
-        name = str(Path(folder) / "fit")
+        name = str(Path(file_name(folder, "folder", "a folder's name")) / "fit")
     else:
-        maker = Maker()
-        name = os.fspath(problem)
+        name = file_name(problem, "problem", "a fit file or a dict of its JSON")
         text = text_of(name)
-        if not initial:
+        given = object_of(text)
+        if not initial or given is None:
             return Problem(text, name, {}, {})
-        data = json.loads(text)
+        data = given
     for key, value in (initial or {}).items():
+        known: list[str] = []
         for k, parameter in enumerate(data.get("parameters", [])):
             entry = {"name": parameter, "path": parameter} if isinstance(parameter, str) else parameter
-            if entry.get("name", entry.get("path")) == key:
-                data["parameters"][k] = {**entry, "initial": float(value)}
+            known.append(str(entry.get("name", entry.get("path"))))
+            if known[-1] == key:
+                data["parameters"][k] = {**entry, "initial": number(value, f"initial {key}")}
                 break
         else:
-            raise _core.TangibleError(f"initial: no parameter of the fit is named {key}")
+            raise _core.TangibleError(
+                f"initial: no parameter of the fit is named {key}; its parameters are: {', '.join(known)}"
+            )
     return Problem(json.dumps(data), name, maker.files, maker.said)
+
+
+def is_table(value: Any) -> bool:
+    """Whether it is a DataFrame, or a dict with a column of times."""
+    if hasattr(value, "columns") and hasattr(value, "index"):
+        return True
+    return isinstance(value, Mapping) and "time" in value and not is_table(value["time"])
+
+
+def _seconds(column: NDArray[Any], where: str) -> NDArray[Any]:
+    """Times in s; time differences, of numpy, pandas or Python, are converted."""
+    if column.dtype.kind == "m":
+        return np.asarray(column / np.timedelta64(1, "s"))
+    if column.dtype.kind == "M":
+        raise TypeError(f"{where}: expected s or time differences, got dates ({column.dtype}): subtract the first")
+    if column.dtype.kind == "O" and any(isinstance(x, timedelta) for x in column.flat):
+        return np.array([x.total_seconds() if isinstance(x, timedelta) else np.nan for x in column.flat])
+    return column
+
+
+def _array(values: Any) -> NDArray[Any]:
+    """A column as an array, in which what is missing is NaN, or None among texts."""
+    if hasattr(values, "isna") and hasattr(values, "to_numpy"):  # of pandas, with its own sign for it
+        array, missing = values.to_numpy(), np.asarray(values.isna())
+        if array.dtype.kind == "O" and missing.any():
+            array = array.copy()
+            array[missing] = None
+        return np.asarray(array)
+    return unmasked(values)
+
+
+def _numbers(column: NDArray[Any], where: str) -> NDArray[np.float64]:
+    """A column of real numbers as such; None is NaN."""
+    kind = column.dtype.kind
+    strange = [x for x in column.flat if isinstance(x, (bool, np.bool_)) or
+               (isinstance(x, Complex) and not isinstance(x, Real))] if kind == "O" else []
+    if kind in "bcmM" or strange:
+        got = type(strange[0]).__name__ if strange else str(column.dtype)
+        raise TypeError(f"{where}: expected real numbers, got {got}")
+    try:
+        numbers = np.array([np.nan if x is None else x for x in column.flat], dtype=np.float64)
+    except (TypeError, ValueError):
+        raise TypeError(f"{where}: expected numbers, got {column.dtype}") from None
+    if np.isinf(numbers).any():
+        raise ValueError(f"{where}: expected finite numbers, or NaN for what was not measured, got an infinite one")
+    return numbers
 
 
 def _columns(table: Any, where: str) -> dict[str, NDArray[Any]]:
     """A dict of arrays, or a DataFrame whose index may be the time, as columns of one length."""
+    hint = ""
     if hasattr(table, "columns") and hasattr(table, "index"):
         if table.index.name == "time" and "time" not in table.columns:
             table = table.reset_index()
-        table = {str(key): table[key].to_numpy() for key in table.columns}
+        elif table.index.name is None:
+            hint = "; an index of times is one that is named: table.rename_axis(\"time\")"
+        table = {str(key): table[key] for key in table.columns}
     if not isinstance(table, Mapping):
         raise TypeError(f"{where}: expected a dict of arrays or a DataFrame, got {type(table).__name__}")
-    columns = {str(key): np.asarray(value) for key, value in table.items()}
+    columns = {str(key): _array(value) for key, value in table.items()}
     if "time" not in columns or columns["time"].ndim != 1:
-        raise ValueError(f"{where}: expected a column time, got {', '.join(columns) or 'none'}")
+        raise ValueError(f"{where}: expected a column time, got {', '.join(columns) or 'none'}{hint}")
     rows = len(columns["time"])
     for key, column in columns.items():
         if column.ndim == 0:
-            columns[key] = np.full(rows, column)
+            columns[key] = column = np.full(rows, column)
         elif column.shape != (rows,):
             raise ValueError(f"{where}: {key}: expected shape {(rows,)}, as time, got {column.shape}")
-        if key not in (*_OWNERS, "relative_to", "event") and column.dtype.kind not in "fiu":
-            try:
-                columns[key] = np.array([np.nan if x is None else x for x in column], dtype=np.float64)
-            except (TypeError, ValueError):
-                raise TypeError(f"{where}: {key}: expected numbers, got {column.dtype}") from None
+        if key == "time":
+            column = _seconds(column, f"{where}: time")
+        if key not in (*_OWNERS, "relative_to", "event"):
+            columns[key] = _numbers(column, f"{where}: {key}")
     if not np.isfinite(columns["time"]).all():
-        raise ValueError(f"{where}: time: expected finite numbers")
+        raise ValueError(f"{where}: time: expected finite numbers, got NaN")
     return columns
 
 
@@ -262,8 +350,8 @@ def of_data(
     points: Mapping[str, Any] | None,
     recordings: Any,
     keys: Mapping[str, Any],
-) -> dict[str, Any]:
-    """The JSON of a fit of a scene to tables."""
+) -> tuple[dict[str, Any], dict[str, str]]:
+    """The JSON of a fit of a scene to tables, and how messages name these."""
     if sigma is None:
         raise TypeError("sigma: expected the standard deviation of what was measured, got None")
     if parameters is None:
@@ -277,19 +365,38 @@ def of_data(
              **(value if isinstance(value, Mapping) else {"initial": value})}
             for name, value in parameters.items()
         ]
-    problem: dict[str, Any] = {"scene": copy.copy(Scene.of(scene)), "parameters": list(parameters), **keys}
-    if points:
-        problem["points"] = dict(points)
+    if not isinstance(parameters, Iterable):
+        raise TypeError(f"parameters: expected a list of paths, got {said(parameters)}")
+    problem: dict[str, Any] = {
+        "scene": copy.copy(Scene.of(scene, "problem")), "parameters": list(parameters), **keys
+    }
+    if points is not None:
+        mapping(points, "points", "a dict {name: {\"body\": name, \"at\": [x, y]}}")
+        problem.update({"points": dict(points)} if points else {})
     if recordings is None:
         problem["observations"] = [{"data": data, "sigma": sigma}]
-        return problem
+        return problem, {"observations/0": "data"}
     if data is not None:
         raise TypeError("data: expected None beside recordings, which have the data, got both")
+    problem["recordings"], labels = _recordings(recordings, sigma)
+    return problem, labels
+
+
+def _recordings(recordings: Any, sigma: Any) -> tuple[list[dict[str, Any]], dict[str, str]]:
+    """The entries of several runs, and how messages name their tables."""
+    if is_table(recordings):
+        raise TypeError("recordings: expected a list of tables or a dict {name: table}, got one table: [table]")
+    if isinstance(recordings, str) or not isinstance(recordings, Iterable):
+        raise TypeError(
+            f"recordings: expected a list of tables or a dict {{name: table}}, got {type(recordings).__name__}"
+        )
     named = recordings.items() if isinstance(recordings, Mapping) else (
         (f"recording {k}", item) for k, item in enumerate(recordings))
-    problem["recordings"] = []
-    for name, item in named:
+    entries: list[dict[str, Any]] = []
+    labels: dict[str, str] = {}
+    for k, (name, item) in enumerate(named):
+        labels[f"recordings/{k}/observations/0"] = f"recordings/{name if isinstance(recordings, Mapping) else k}"
         own = dict(item) if isinstance(item, Mapping) and "data" in item else {"data": item}
         entry = {"data": own.pop("data"), "sigma": own.pop("sigma", sigma)}
-        problem["recordings"].append({"name": name, **own, "observations": [entry]})
-    return problem
+        entries.append({"name": name, **own, "observations": [entry]})
+    return entries, labels

@@ -14,12 +14,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _core, _executor
 from ._certificate import Certificate
-from ._plain import integers, paths
+from ._plain import choice, flag, integers, masked, number, paths, said, seed_of, whole
 from ._scene import Scene, SceneLike
 
 Floats = NDArray[np.float64]
 # Numbers as an array, or by their names: {name: value}.
 Numbers = Union[ArrayLike, Mapping[str, ArrayLike]]
+# As the programs' --threads.
+MOST_THREADS = 256
+_METHODS = ("auto", "adjoint", "tangent", "jet", "jet_implicit", "finite_difference")
+_KINKS = ("element", "raise", "smoothed")
 
 
 @dataclass(frozen=True)
@@ -65,10 +69,11 @@ class Smoothing:
     everywhere: bool = False
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.deviation) and self.deviation > 0.0):
-            raise ValueError(f"deviation: expected a number > 0, got {self.deviation}")
-        if self.samples < 2 or self.samples % 2 != 0:
+        number(self.deviation, "deviation", above=0.0, what="a number > 0")
+        if whole(self.samples, "samples", 2, what="an even number >= 2") % 2 != 0:
             raise ValueError(f"samples: expected an even number >= 2, got {self.samples}")
+        seed_of(self.seed)
+        flag(self.everywhere, "everywhere")
 
     def draw(self, values: Floats, generator: np.random.Generator) -> Floats:
         """Samples around each row: shape (rows * samples, ...)."""
@@ -79,15 +84,45 @@ class Smoothing:
         return np.ascontiguousarray(around.reshape(rows * self.samples, *shape))
 
 
+def check_kinks(kinks: str, smoothing: Smoothing | None) -> None:
+    """Refuses what `Rollout.vjp` does not take."""
+    choice(kinks, "kinks", *_KINKS)
+    if smoothing is not None and not isinstance(smoothing, Smoothing):
+        raise TypeError(f"smoothing: expected a Smoothing or None, got {said(smoothing)}")
+
+
 def floats(values: ArrayLike, name: str) -> Floats:
     """The numbers as an array of the engine's. What is no real number is refused: numpy would turn
-    True into 1, None into NaN, and drop the imaginary part of complex numbers."""
+    True into 1, None into NaN, drop the imaginary part of complex numbers, and the mask of arrays."""
+    if masked(values) is not None:
+        raise ValueError(f"{name}: expected numbers, got an array that masks some")
     array = np.asarray(values)
     if array.dtype.kind == "O" and all(isinstance(x, Real) for x in array.flat):
         pass  # fractions, whole numbers of more than 64 bits
     elif array.dtype.kind not in "fiu":
         raise TypeError(f"{name}: expected real numbers, got an array of {array.dtype}")
     return np.ascontiguousarray(array, dtype=np.float64)
+
+
+def finite(
+    values: Floats | None, name: str, names: Sequence[str], batched: bool
+) -> None:
+    """Refuses NaN and infinite numbers, in the words of a row that the engine refuses.
+
+    Args:
+        values: Shape (rows, ..., len(names)); None: there are none.
+        name: Of the argument, with a blank behind it where it is said.
+        names: Of the last axis.
+        batched: Whether the caller knows of rows.
+    """
+    if values is None or np.isfinite(values).all():
+        return
+    at = np.argwhere(~np.isfinite(values))[0]
+    found = values[tuple(at)]
+    got = "NaN" if np.isnan(found) else "Infinity" if found > 0 else "-Infinity"
+    row = f"row {at[0]}: " if batched else ""
+    step = f" in step {at[1]}" if values.ndim == 3 else ""
+    raise _core.TangibleError(f"{row}{name}{names[at[-1]]}: expected a finite number, got {got}{step}")
 
 
 def _by_name(
@@ -155,7 +190,7 @@ class Rollout:
             "joints/motor/effort/target".
         records: Steps whose states are returned (0: the start); absent: the state at the end, and
             results have no axis for it.
-        threads: Of batches; 0: one a core. Results have the same bits for any number.
+        threads: Of batches, up to 256; 0: one a core. Results have the same bits for any number.
 
     The rows of a batch may be done by the processes of an `executor` of `concurrent.futures`, on this
     machine or, as those of `mpi4py.futures` and of a dask client, on others, with the same bits. Each
@@ -174,7 +209,7 @@ class Rollout:
         read = Scene.of(scene)
         core = read.core
         self.scene = read._copy()  # of which later changes of the scene are no part
-        self.threads = int(threads)
+        self.threads = whole(threads, "threads", 0, MOST_THREADS)
         self._single = records is None
         steps = [] if records is None else integers(records, "records")
         if records is not None and not steps:
@@ -248,9 +283,22 @@ class Rollout:
         def spread(array: Floats, axes: int) -> Floats:
             if array.ndim > axes:
                 return array
+            if rows == 1:  # without the 6 us that broadcast_to takes
+                return np.ascontiguousarray(array[None])
             return np.ascontiguousarray(np.broadcast_to(array, (rows, *array.shape)))
 
         return spread(p, 1), None if x is None else spread(x, 1), spread(u, 2), batched
+
+    def _finite(self, p: Floats, x: Floats | None, u: Floats, batched: bool, on_failure: str) -> None:
+        """Refuses what the engine's messages would name in their own words, unless rows may fail."""
+        choice(on_failure, "on_failure", "raise", "nan")
+        if on_failure != "raise":
+            return
+        # Names are made where they are said: the engine makes a list of them at each look.
+        if not all(values is None or np.isfinite(values).all() for values in (p, x, u)):
+            finite(p, "", self.parameters, batched)
+            finite(x, "initial_state ", self.outputs, batched)
+            finite(u, "controls ", self.controls, batched)
 
     def _shape(self, states: Floats, batched: bool) -> Floats:
         shaped: Floats = states[:, 0] if self._single else states
@@ -258,8 +306,6 @@ class Rollout:
 
     @staticmethod
     def _check(statuses: list[str], messages: list[str], batched: bool, on_failure: str) -> None:
-        if on_failure not in ("raise", "nan"):
-            raise ValueError(f"on_failure: expected raise or nan, got {on_failure}")
         for row, (status, message) in enumerate(zip(statuses, messages)):
             if status != "done" and on_failure == "raise":
                 raise _core.TangibleError(f"row {row}: {message}" if batched else message)
@@ -288,6 +334,7 @@ class Rollout:
         """
         _executor.check(executor)
         p, x, u, batched = self._inputs(parameters, initial_state, controls)
+        self._finite(p, x, u, batched, on_failure)
         states, statuses, messages = _executor.of_rows(
             executor, "run", self._core, (p, x, u), self.threads
         )
@@ -308,7 +355,11 @@ class Rollout:
         and `executor` are those of a call.
         """
         _executor.check(executor)
+        for name, given in (("primals", primals), ("tangents", tangents)):
+            if not isinstance(given, (tuple, list)) or len(given) != 3:
+                raise TypeError(f"{name}: expected (parameters, initial state, controls), got {said(given)}")
         p, x, u, batched = self._inputs(*primals)
+        self._finite(p, x, u, batched, on_failure)
         rows = p.shape[0]
 
         def direction(k: int, name: str, names: Sequence[str]) -> Floats:
@@ -360,9 +411,9 @@ class Rollout:
             TangibleError: As a call; or with "raise" the verdict of the first row that is not
                 trustworthy as one of the map; or no sample of "smoothed" could be run.
         """
-        if kinks not in ("element", "raise", "smoothed"):
-            raise ValueError(f"kinks: expected element, raise or smoothed, got {kinks}")
+        check_kinks(kinks, smoothing)
         p, x, u, batched = self._inputs(parameters, initial_state, controls)
+        self._finite(p, x, u, batched, on_failure)
         smoothing = smoothing or Smoothing()
         if kinks == "smoothed" and smoothing.everywhere:
             return self._vjp_of_mean(p, x, u, batched, on_failure, smoothing)
@@ -484,6 +535,8 @@ class Rollout:
         p, x, u, batched = self._inputs(parameters, initial_state, controls)
         if batched:
             raise ValueError("jacobian: expected arguments without a batch's axis")
+        choice(method, "method", *_METHODS)
+        self._finite(p, x, u, False, "raise")
         states, status, message, used, all_columns = self._core.jacobian(p, x, u, method)
         self._check([status], [message], False, "raise")
         matrix = all_columns[0] if self._single else all_columns
@@ -519,6 +572,8 @@ class Rollout:
         p, x, u, batched = self._inputs(parameters, initial_state, controls)
         if batched:
             raise ValueError("certificate: expected arguments without a batch's axis")
+        flag(radius, "radius")
+        self._finite(p, x, u, False, "raise")
         certificate = Certificate.of_json(self._core.certify(p, x, u, self.threads)[0])
         if radius:
             more = json.loads(self._core.radii(p, x, u))
@@ -544,3 +599,9 @@ class Rollout:
             f"Rollout({self.scene!r}, parameters={self.parameters}, controls={self.controls}, "
             f"steps={self.num_steps})"
         )
+
+
+def check_rollout(function: object) -> None:
+    """Refuses what is no rollout."""
+    if not isinstance(function, Rollout):
+        raise TypeError(f"function: expected a tangible.Rollout, got {type(function).__name__}")

@@ -11,9 +11,10 @@ from types import MappingProxyType
 from typing import Any, Union
 
 from . import _core
-from ._plain import plain
+from ._plain import file_name, mapping, plain, text
 
 SceneLike = Union["Scene", Mapping[str, Any], str, "os.PathLike[str]"]
+_EXPECTED = "a Scene, a scene file or a dict of its JSON"
 
 
 def _name_in(data: Mapping[str, Any]) -> str:
@@ -52,7 +53,7 @@ class Scene:
         **keys: Any,
     ) -> None:
         self._file = ""  # where it was read, which errors name
-        self._folder = os.fspath(folder)
+        self._folder = file_name(folder, "folder", "a folder's name")
         self._read: _core.Scene | None = None
         self._data: dict[str, Any] = {"bodies": []}
         if isinstance(scene, Scene):
@@ -61,7 +62,7 @@ class Scene:
         elif isinstance(scene, Mapping):
             self._data = plain(scene, _name_in(scene))
         elif scene is not None:
-            self._file = os.fspath(scene)
+            self._file = file_name(scene, "scene", _EXPECTED)
             self._folder = str(Path(self._file).parent)
             self._read = _core.Scene.load(self._file)
             self._data = {}
@@ -82,9 +83,11 @@ class Scene:
         return self._file or _name_in(self._data)
 
     @staticmethod
-    def of(scene: SceneLike) -> Scene:
-        """The scene itself, or one made from a file's name or a dict."""
-        return scene if isinstance(scene, Scene) else Scene(scene)
+    def of(scene: SceneLike, name: str = "scene") -> Scene:
+        """The scene itself, or one made from a file's name or a dict; `name`: of the argument."""
+        if isinstance(scene, Scene):
+            return scene
+        return Scene(scene if isinstance(scene, Mapping) else file_name(scene, name, _EXPECTED))
 
     @staticmethod
     def _of_core(core: _core.Scene) -> Scene:
@@ -147,8 +150,7 @@ class Scene:
     def core(self) -> _core.Scene:
         """What the engine has read; raises `TangibleError` where it cannot."""
         if self._read is None:
-            text = json.dumps(self._data)
-            self._read = _core.Scene.parse(text, self.name, self._folder)
+            self._read = _core.Scene.parse(json.dumps(self._data), self.name, self._folder)
         return self._read
 
     def to_dict(self) -> dict[str, Any]:
@@ -164,18 +166,25 @@ class Scene:
 
     def save(self, file: str | os.PathLike[str]) -> None:
         """Writes a scene file, with the series of its signals: it can be read in any folder."""
-        Path(file).write_text(self.core.to_whole_json() + "\n", encoding="utf-8")
+        Path(file_name(file, "file")).write_text(self.core.to_whole_json() + "\n", encoding="utf-8")
 
     def with_parameters(self, parameters: Mapping[str, float]) -> Scene:
-        """The scene with other values of parameters: {path: value in SI units}."""
+        """The scene with other values of parameters: {path: value in SI units}.
+
+        Raises:
+            TangibleError: A path that the scene does not have, or a value that is not allowed.
+            TypeError: What is no dict of numbers.
+        """
+        mapping(parameters, "parameters", "a dict {path: value}")
         changed = Scene.__new__(Scene)
         changed._file = self._file
         changed._folder = self._folder
         changed._data = {}
-        values = [plain(value, self.name, f" {path}") for path, value in parameters.items()]
+        values = [plain(value, self.name, path) for path, value in parameters.items()]
         for path, value in zip(parameters, values):
+            text(path, "parameters", "paths of parameters")
             if isinstance(value, bool) or not isinstance(value, (int, float)):
-                raise TypeError(f"{path}: expected a number, got {value!r}")
+                raise TypeError(f"parameters: {path}: expected a number, got {value!r}")
         changed._read = self.core.with_parameters(list(parameters), [float(v) for v in values])
         return changed
 
@@ -215,11 +224,11 @@ class Scene:
     def range(self, path: str) -> tuple[float, float]:
         """The range that a parameter's values may have: (0, inf) of a mass or a friction, (0, 1) of a
         restitution, (-inf, inf) of a position."""
-        return self.core.range(path)
+        return self.core.range(text(path, "path", "the path of a parameter"))
 
     def __getitem__(self, path: str) -> float:
         """The value of a parameter; of several that match, of the first."""
-        return self.core.value(path)
+        return self.core.value(text(path, "path", "the path of a parameter"))
 
     def __repr__(self) -> str:
         if not self._data:

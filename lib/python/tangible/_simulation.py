@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core
-from ._plain import integers, paths
-from ._rollout import Numbers, Rollout, _array, floats
+from ._plain import choice, integers, mapping, number, paths, seed_of, whole
+from ._rollout import MOST_THREADS, Numbers, Rollout, _array, finite, floats
 from ._scene import Scene, SceneLike
 
 Floats = NDArray[np.float64]
@@ -39,7 +40,15 @@ class Simulation:
         domains: Values of parameters, {path: shape (D,)}: `reset` draws one of the D for each row,
             all its values together. Its paths are added to `parameters`.
         on_failure: "raise", or "nan" in states of rows that have failed, until they are reset.
-        threads: Of batches; 0: one a core. Results have the same bits for any number.
+        threads: Of batches, up to 256; 0: one a core. Results have the same bits for any number.
+
+    It is pickled and copied as it is made or reset. After a step `pickle` and `copy` raise TypeError:
+    what the engine keeps between steps (its time, and how the last contacts bore) is no part of the
+    state; another one that is reset to the `state` goes on to rounding where nothing depends on time.
+
+    Raises:
+        TangibleError: A mistake in the scene or a path.
+        ValueError, TypeError: An argument that cannot be used.
     """
 
     def __init__(
@@ -54,34 +63,59 @@ class Simulation:
         on_failure: str = "raise",
         threads: int = 0,
     ) -> None:
-        if batch is not None and batch < 1:
-            raise ValueError(f"batch: expected a number >= 1, got {batch}")
-        if on_failure not in ("raise", "nan"):
-            raise ValueError(f"on_failure: expected raise or nan, got {on_failure}")
+        batch = None if batch is None else whole(batch, "batch", 1)
+        choice(on_failure, "on_failure", "raise", "nan")
+        noise, domains = {} if noise is None else noise, {} if domains is None else domains
+        mapping(noise, "noise", "a dict {name: standard deviation}")
+        mapping(domains, "domains", "a dict {path: values}")
         read = Scene.of(scene)
         self.scene = read._copy()
         self.batch = batch
         self.on_failure = on_failure
         outputs = Rollout(read).outputs
-        moved = [name for name in noise or {} if name not in outputs]
-        names = list(dict.fromkeys([*paths(parameters, "parameters"), *(domains or {}), *moved]))
+        moved = [name for name in paths(list(noise), "noise") if name not in outputs]
+        names = list(dict.fromkeys([*paths(parameters, "parameters"), *paths(list(domains), "domains"), *moved]))
         # It checks the paths and knows the scene's own values.
         self._rollout = Rollout(read, names, controls)
         self._rows = 1 if batch is None else batch
-        self._core = _core.Simulation(
-            read.core, names, self._rollout.controls, self._rows, threads if self._rows > 1 else 1
-        )
+        self._threads = whole(threads, "threads", 0, MOST_THREADS)
+        self._core = self._make()
+        self._set = np.tile(self._rollout.default_parameters, (self._rows, 1))  # parameters of each row
         self._own = np.array([read[path] for path in self.controls])
         self._noise = np.zeros(len(outputs))
         self._spread_of_parameters = np.zeros(len(names))
-        for name, deviation in (noise or {}).items():
+        for name, deviation in noise.items():
+            spread = number(deviation, f"noise {name}", 0.0, what="a standard deviation >= 0")
             if name in outputs:
-                self._noise[outputs.index(name)] = float(deviation)
+                self._noise[outputs.index(name)] = spread
             else:
-                self._spread_of_parameters[names.index(name)] = float(deviation)
+                self._spread_of_parameters[names.index(name)] = spread
         self._dt = float(json.loads(read.core.to_json())["simulation"]["dt"])
-        self._domains = self._read_domains(domains or {})
+        self._domains = self._read_domains(domains)
         self._generator = np.random.default_rng()
+
+    def _make(self) -> _core.Simulation:
+        return _core.Simulation(
+            self.scene.core, self.parameters, self.controls, self._rows, self._threads if self._rows > 1 else 1
+        )
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What pickle keeps: the engine's rows are begun anew from their states."""
+        if any(self._core.steps_done()):
+            raise TypeError(
+                "Simulation: expected one before its first step, as what the engine keeps between steps "
+                "cannot be copied; pickle its `scene` and `state`, and reset another one to that"
+            )
+        kept = {key: value for key, value in self.__dict__.items() if key != "_core"}
+        return {**kept, "_states": self._core.states()}
+
+    def __setstate__(self, kept: dict[str, Any]) -> None:
+        states: Floats = kept.pop("_states")
+        self.__dict__.update(kept)
+        self._core = self._make()
+        self._set = self._set.copy()  # which a shallow copy would share
+        begun = np.flatnonzero(np.isfinite(states).all(axis=1))
+        self._core.reset(begun.tolist(), self._set[begun], np.ascontiguousarray(states[begun]))
 
     def _read_domains(self, domains: Mapping[str, ArrayLike]) -> Floats | None:
         columns = {path: floats(values, f"domains {path}") for path, values in domains.items()}
@@ -90,6 +124,9 @@ class Simulation:
             raise ValueError(f"domains: expected arrays of one shape (D,), got {sorted(sizes)}")
         if not columns:
             return None
+        for path, column in columns.items():
+            if not (len(column) and np.isfinite(column).all()):
+                raise ValueError(f"domains {path}: expected finite numbers, got {column}")
         table = np.tile(self._rollout.default_parameters, (*sizes.pop(), 1))
         for path, column in columns.items():
             table[:, self.parameters.index(path)] = column
@@ -167,16 +204,17 @@ class Simulation:
         Args:
             state: Shape (S,), or one for each row that is reset, or a dict of what differs from the
                 scene's; `noise` is added to it. Absent: the scene's, as its parameters make it.
-            seed: Of `noise` and `domains` from now on; absent: they go on.
+            seed: Of `noise` and `domains` from now on, a whole number >= 0; absent: they go on.
             parameters: Shape (P,), or one for each row, or a dict; absent: drawn from `domains`, or
                 the scene's.
             rows: Which of a batch; absent: all. The others keep their state.
 
         Raises:
             TangibleError: A value that is not allowed.
+            ValueError, TypeError: An argument that cannot be used.
         """
         if seed is not None:
-            self._generator = np.random.default_rng(seed)
+            self._generator = np.random.default_rng(seed_of(seed))
         chosen = list(range(self._rows)) if rows is None else integers(rows, "rows")
         if any(not 0 <= row < self._rows for row in chosen):
             raise ValueError(f"rows: expected numbers from 0 to {self._rows - 1}, got {chosen}")
@@ -191,6 +229,9 @@ class Simulation:
         if self._spread_of_parameters.any():
             shape = (count, len(self.parameters))
             p = p + self._spread_of_parameters * self._generator.standard_normal(shape)
+        if self.on_failure == "raise":
+            finite(p, "", self.parameters, self.batch is not None)
+        self._set[chosen] = p
         x: Floats | None = None
         if state is not None:
             base = self._rollout.default_initial_state
@@ -213,9 +254,9 @@ class Simulation:
 
         Raises:
             TangibleError: A step that failed; a value that is not finite; no reset before.
+            ValueError, TypeError: An argument that cannot be used.
         """
-        if steps < 1:
-            raise ValueError(f"steps: expected a number >= 1, got {steps}")
+        steps = whole(steps, "steps", 1)
         own = self._own
         u = own if action is None else action
         values = self._spread(u, "action", self.controls, own, self._rows)

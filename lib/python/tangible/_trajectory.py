@@ -16,7 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _core
 from ._certificate import Certificate
-from ._rollout import Numbers, Rollout
+from ._plain import choice, file_name, flag, mapping, text, whole
+from ._rollout import Numbers, Rollout, finite
 from ._scene import Scene, SceneLike
 from ._warning import warn
 
@@ -98,7 +99,7 @@ class Events:
 def display(page: Any, file: str | os.PathLike[str] | None) -> None:
     """Plays a page in a notebook, or writes it to a file: `show` of what has an `html()`."""
     if file is not None:
-        Path(file).write_text(page.html(), encoding="utf-8")
+        Path(file_name(file, "file")).write_text(page.html(), encoding="utf-8")
         return
     try:
         ipython = importlib.import_module("IPython")
@@ -174,7 +175,7 @@ class Trajectory:
     def __getitem__(self, name: str) -> Floats:
         """A coordinate over time, shape (T,): "ball/x", "ball/angle", "ball/vy", and of joints
         "hinge/coordinate", "hinge/rate"."""
-        owner, _, component = name.rpartition("/")
+        owner, _, component = text(name, "name", "the name of a coordinate").rpartition("/")
         if owner in self.bodies and component in COMPONENTS:
             i, k = self.bodies.index(owner), COMPONENTS.index(component)
             return self.poses[:, i, k] if k < 3 else self.twists[:, i, k - 3]
@@ -201,9 +202,10 @@ class Trajectory:
 
     def unit(self, name: str) -> str:
         """The unit of a coordinate: "m", "rad", "m/s", "rad/s"."""
-        owner, _, component = name.rpartition("/")
+        owner, _, component = text(name, "name", "the name of a coordinate").rpartition("/")
         if component in UNITS:
             return UNITS[component]
+        self[name]  # raises where there is none
         unit = self.joints.units[self.joints.names.index(owner)]
         return unit if component == "coordinate" else f"{unit}/s"
 
@@ -230,7 +232,7 @@ class Trajectory:
         for time, poses, twists in zip(self.times, self.poses, self.twists):
             for body, numbers in zip(self.bodies, np.concatenate([poses, twists], axis=1)):
                 rows.append(",".join([f"{time:.17g}", body, *(f"{x:.17g}" for x in numbers)]))
-        Path(file).write_text("\n".join(rows) + "\n", encoding="utf-8")
+        Path(file_name(file, "file")).write_text("\n".join(rows) + "\n", encoding="utf-8")
 
     @property
     def final(self) -> dict[str, float]:
@@ -396,28 +398,34 @@ def simulate(
     Raises:
         TangibleError: A mistake in the scene or a value that is not allowed; a run that ended early.
         ValueError: A shape, or a name that the scene does not have.
+        TypeError: An argument that cannot be used.
 
     Warns:
         TangibleWarning: Of what `Trajectory.warnings` lists.
     """
-    if on_failure not in ("raise", "return"):
-        raise ValueError(f"on_failure: expected raise or return, got {on_failure}")
+    choice(on_failure, "on_failure", "raise", "return")
+    every, certify = whole(every, "every", 1), flag(certify, "certify")
+    if controls is not None:
+        mapping(controls, "controls", "a dict {path: a number, or one for each step}")
     read = Scene.of(scene)
-    if parameters:
-        read = read.with_parameters(parameters)
+    if parameters is not None:
+        mapping(parameters, "parameters", "a dict {path: value}")
+        read = read.with_parameters(parameters) if parameters else read
     state: Floats | None = None
     values: Floats | None = None
     paths = list(controls or {})
     if initial_state is not None or controls:
         rollout = Rollout(read, [], paths)
-        values = rollout._inputs(None, None, controls)[2]
-        if values.shape[0] != 1:
-            raise ValueError(f"controls: expected one run, got a batch of {values.shape[0]}")
-        values = values[0]
+        rows = rollout._inputs(None, None, controls)[2]
+        if rows.shape[0] != 1:
+            raise ValueError(f"controls: expected one run, got a batch of {rows.shape[0]}")
+        finite(rows, "controls ", paths, False)
+        values = rows[0]
         if initial_state is not None:
             state = _initial_state(rollout, initial_state).reshape(-1)
             if state.shape != (len(rollout.outputs),):
                 raise ValueError("initial_state: expected the state of one run, got a batch")
+            finite(state[None], "initial_state ", rollout.outputs, False)
     trajectory = Trajectory(read, _core.simulate(read.core, every, certify, state, paths, values))
     if trajectory.status != "done" and on_failure == "raise":
         raise _core.TangibleError(trajectory.message)

@@ -19,6 +19,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._core import TangibleError
+from ._plain import function, number, said, whole
+from ._rollout import floats
 from ._scene import Scene, SceneLike
 from ._simulation import Simulation
 
@@ -63,6 +65,13 @@ class SceneEnv(gymnasium.Env):  # type: ignore[misc]
         noise: Mapping[str, float] | None = None,
         domains: Mapping[str, ArrayLike] | None = None,
     ) -> None:
+        steps = whole(steps, "steps", 1)
+        if duration is not None:
+            duration = number(duration, "duration", above=0.0, what="a time > 0 in s")
+        if not callable(reward):
+            raise TypeError(f"reward: expected a function, got {said(reward)}")
+        function(terminated, "terminated")
+        function(observe, "observe")
         read = Scene.of(scene)
         self.simulation = Simulation(read, controls, noise=noise, domains=domains)
         self._reward = reward
@@ -74,8 +83,8 @@ class SceneEnv(gymnasium.Env):  # type: ignore[misc]
         self._limit = round(duration / (steps * self.simulation.dt))
         self._count = 0
         count = len(controls)
-        self._low = np.broadcast_to(np.asarray(low, dtype=np.float64), (count,))
-        self._high = np.broadcast_to(np.asarray(high, dtype=np.float64), (count,))
+        self._low = np.broadcast_to(floats(low, "low"), (count,))
+        self._high = np.broadcast_to(floats(high, "high"), (count,))
         shape = np.shape(self._observe(np.zeros(len(self.simulation.outputs))))
         self.action_space = gymnasium.spaces.Box(
             self._low.astype(np.float32), self._high.astype(np.float32), dtype=np.float32

@@ -19,7 +19,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ._rollout import Rollout, Smoothing
+from ._rollout import Rollout, Smoothing, check_kinks, check_rollout
 
 __all__ = ["rollout"]
 
@@ -47,8 +47,8 @@ def rollout(
         function: What is rolled out; its arguments and shapes are those of `Rollout.__call__`.
         kinks, smoothing: As of `Rollout.vjp`.
     """
-    if kinks not in ("element", "raise", "smoothed"):
-        raise ValueError(f"kinks: expected element, raise or smoothed, got {kinks}")
+    check_rollout(function)
+    check_kinks(kinks, smoothing)
     sizes = (
         function.default_parameters.shape,
         function.default_initial_state.shape,

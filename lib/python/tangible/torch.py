@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 import torch
 
+from ._plain import choice, mapping, paths, said
 from ._rollout import Rollout as _Rollout
-from ._rollout import Smoothing
+from ._rollout import Smoothing, check_kinks, check_rollout
 from ._scene import SceneLike
 
 __all__ = ["RolloutLayer", "rollout"]
@@ -112,6 +113,7 @@ def rollout(
         on_failure: "raise", or "nan" in states that were not reached: rows that failed have the
             derivative 0, so that a loss of the others (`torch.nanmean`, or a mask) can be minimised.
     """
+    check_rollout(function)
     named = {"parameters": parameters, "initial_state": initial_state, "controls": controls}
     given = {name: tensor for name, tensor in named.items() if tensor is not None}
     for name, tensor in given.items():
@@ -123,8 +125,7 @@ def rollout(
     like = next(iter(given.values()), torch.empty(0, dtype=torch.float64))
     if not torch.is_grad_enabled() or not any(tensor.requires_grad for tensor in given.values()):
         # Without a derivative to take no tape is needed, and a kink is none of the caller's business.
-        if kinks not in ("element", "raise", "smoothed"):
-            raise ValueError(f"kinks: expected element, raise or smoothed, got {kinks}")
+        check_kinks(kinks, smoothing)
         arrays = [_numpy(tensor) for tensor in (parameters, initial_state, controls)]
         states = function(*arrays, on_failure=on_failure)
         return torch.as_tensor(states).to(device=like.device, dtype=like.dtype)
@@ -174,6 +175,12 @@ class RolloutLayer(torch.nn.Module):
         self.kinks = kinks
         self.smoothing = smoothing
         self.on_failure = on_failure
+        if positive is not None:
+            positive = paths(positive, "positive")
+        if bounds is not None:
+            mapping(bounds, "bounds", "a dict {path: (low, high)}")
+        choice(on_failure, "on_failure", "raise", "nan")
+        check_kinks(kinks, smoothing)
         start = torch.as_tensor(self.function.default_parameters)
         limits = dict(bounds or {})
         for name in [*(positive or []), *limits]:
@@ -201,7 +208,10 @@ class RolloutLayer(torch.nn.Module):
         self, path: str, limits: Mapping[str, tuple[float, float]], positive: Sequence[str]
     ) -> tuple[float, float]:
         if path in limits:
-            return float(limits[path][0]), float(limits[path][1])
+            pair = limits[path]
+            if not isinstance(pair, (tuple, list)) or len(pair) != 2:
+                raise TypeError(f"bounds: {path}: expected (low, high), got {said(pair)}")
+            return float(pair[0]), float(pair[1])
         low, high = self.function.scene.range(path)
         return (max(low, 0.0) if path in positive else low), high
 
