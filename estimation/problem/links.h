@@ -12,8 +12,8 @@
 //
 // where ℓ = scale p + offset of a parameter p. All these numbers are linear in p: the length is
 // written as the sets of numbers that add (parameterized_scene.h). The centre of mass of the link's
-// body stays where it is, with its inertia and shape, unless it is at b: the bob of a pendulum moves
-// along, and its other points stay. The bodies beyond b must hang from b alone.
+// body stays where it is, with its inertia and shape, unless it is at b: the bob of a pendulum
+// moves along, and its other points stay. The bodies beyond b must hang from b alone.
 
 #include <string>
 #include <vector>

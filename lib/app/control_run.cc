@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <ctime>
 #include <optional>
 #include <random>
@@ -525,10 +526,17 @@ std::string RunPredictive(const std::string& name, const ControlFile& file, cons
       errors[names[i]] = std::sqrt(made.squared_errors[static_cast<Eigen::Index>(i)] /
                                    static_cast<double>(made.controls.rows()));
     }
-    run->result["estimates"] = {
-        {"observations", made.observations},
-        {"surprise_mean", made.surprise / static_cast<double>(made.observations)},
-        {"error_rms", std::move(errors)}};
+    const double surprise = made.surprise / static_cast<double>(made.observations);
+    run->result["estimates"] = {{"observations", made.observations},
+                                {"surprise_mean", surprise},
+                                {"error_rms", std::move(errors)}};
+    if (surprise > kSurprising) {
+      char times[32];
+      std::snprintf(times, sizeof times, "%.2g", surprise);
+      run->warnings.push_back("observations surprise the model's filter " + std::string(times) +
+                              " times as much as their noise should: the plant moves otherwise "
+                              "than the model, or acceleration_sigma is too small");
+    }
   }
   run->verdict.status = "done";
   run->scene = plant;

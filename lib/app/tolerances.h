@@ -12,5 +12,8 @@ inline constexpr double kSymmetric = 1e-9;
 inline constexpr double kDefiniteRounding = 1e-15;
 /// Of a step: the times in a table of controls may be off by it, as they are written in decimals.
 inline constexpr double kSameStep = 1e-6;
+/// Of 1, where model and noise are what they are said to be: a run whose observations surprise its
+/// filter by more in the mean says so; of hundreds of numbers the mean is within some tenths.
+inline constexpr double kSurprising = 2.0;
 
 }  // namespace tangible

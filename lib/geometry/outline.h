@@ -144,8 +144,8 @@ Aabb BoxOfOutline(const Outline& outline, const Pose<double>& pose, double margi
 
 /// FindContactFeatures for one run of a polyline and another shape, which is no half-plane: the
 /// lowest vertex over the run and its lower neighbour over it, and the corners at which the run
-/// starts or the outline ends. `side`: which one the polyline is. `seams`: those of the other shape,
-/// or null.
+/// starts or the outline ends. `side`: which one the polyline is. `seams`: those of the other
+/// shape, or null.
 int FindOutlineFeatures(const Outline& outline, int run, const ShapeView<double>& shape_a,
                         const Pose<double>& pose_a, const ShapeView<double>& shape_b,
                         const Pose<double>& pose_b, SeamSide side, const ShapeSeams* seams,

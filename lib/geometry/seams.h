@@ -89,8 +89,8 @@ struct FlushSteps {
   double highest = 0.0;  ///< m
 };
 
-/// Sets what the neighbours leave of a box, polygon or outline, and returns whether they take anything. Adds
-/// the steps down from it that exceed rounding to `steps`.
+/// Sets what the neighbours leave of a box, polygon or outline, and returns whether they take
+/// anything. Adds the steps down from it that exceed rounding to `steps`.
 bool FindSeams(const PlacedShape& placed, const std::vector<PlacedShape>& neighbours,
                ShapeSeams* seams, FlushSteps* steps);
 

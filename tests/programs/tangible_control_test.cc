@@ -128,6 +128,17 @@ TEST_F(TangibleControlTest, RecedingHorizonsFromNoisyObservations) {
       played(R"({"sensors": [{"point": {"body": "cart", "at": [0.1, 0]}, "sigma": 0.01}]})");
   EXPECT_LT(point["estimates"]["error_rms"]["cart/x"].get<double>(), 0.01);
 
+  // A plant of other mass is not what the filter expects, and noise alone says nothing.
+  std::string light = kCart;
+  light.replace(light.find("\"mass\": 2"), 9, "\"mass\": 0.2");
+  Write("light.json", light);
+  const std::string exact = sensors + R"(, "acceleration_sigma": 0.01})";
+  const ProgramRun other = Control(problem(exact), "--mpc --plant='" + Path("light.json") + "'");
+  EXPECT_EQ(other.exit_status, 0) << other.error;
+  EXPECT_NE(other.error.find("observations surprise the model's filter"), std::string::npos)
+      << other.error << other.out.substr(0, 400);
+  EXPECT_EQ(Control(problem(exact), "--mpc").error.find("surprise"), std::string::npos);
+
   for (const auto& [observations, message] :
        {std::pair(R"({})", "/mpc/observations/sensors: missing"),
         {R"({"sensors": []})", "/mpc/observations/sensors: expected at least one sensor, got none"},

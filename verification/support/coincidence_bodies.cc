@@ -484,7 +484,19 @@ void CoincidenceMaker::PassesASeam() {
     BasicBody<double> tile;
     tile.name = Named(side < 0 ? "left" : "right");
     tile.motion = Motion::kStatic;
-    tile.shape = {ShapeType::kBox, {4.0, 0.5}};
+    // A box, a line along its outline from right to left, or a polygon with a notch in its foot.
+    switch ((made_.scene.bodies.size() + (side < 0 ? 0 : 2)) % 3) {
+      case 0:
+        tile.shape = {ShapeType::kBox, {4.0, 0.5}};
+        break;
+      case 1:
+        tile.shape = {ShapeType::kPolyline, {2.0, -0.25, 2.0, 0.25, -2.0, 0.25, -2.0, -0.25}};
+        break;
+      default:
+        tile.shape = {
+            ShapeType::kPolygon,
+            {-2.0, -0.25, -0.5, -0.25, 0.0, 0.0, 0.5, -0.25, 2.0, -0.25, 2.0, 0.25, -2.0, 0.25}};
+    }
     tile.position = Vector2<double>(seam + 2.0 * side, 0.75);
     tile.friction = disc.friction;
     made_.scene.bodies.push_back(tile);

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "tangible/lcp/system/contact_system.h"
 #include "tangible/lcp/system/tolerances.h"
@@ -19,11 +18,7 @@ constexpr double kMostPushed = 1e6;
 
 // x / scale, with 0/0 = 0. Numbers next to the smallest ones have no digits to be compared: what
 // decays by its rounding in each step comes there.
-double ShareOf(double x, double scale) {
-  constexpr double kHasDigits =
-      std::numeric_limits<double>::min() / std::numeric_limits<double>::epsilon();
-  return scale > kHasDigits ? x / scale : 0.0;
-}
+double ShareOf(double x, double scale) { return scale > kLeastScale ? x / scale : 0.0; }
 
 // The largest component of a row for a body, with rotation taken at the body's lever.
 double RowSize(const RowPart<double>& row, double lever) {

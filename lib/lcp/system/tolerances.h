@@ -44,5 +44,8 @@ inline constexpr double kPushRank = 1e-7;
 /// Of the largest normal impulse: a guess of which many impulses exceed their limits by more is
 /// given up before its solve is refined.
 inline constexpr double kPlainlyBeyond = 1e-3;
+/// Absolute: a scale next to the smallest numbers, min / ε, of which no digits are left that could
+/// be compared.
+inline constexpr double kLeastScale = 1e-292;
 
 }  // namespace tangible

@@ -241,9 +241,9 @@ bool SupportIteration::Accept(const Model<double>& model, const ContactProblem<d
   if (residual_ <= kSupportSettled) {
     is_about_ = true;
     ++iterations_;
-    visit([&](size_t k, const double*, const double* twist, const double*) {
+    visit([&](size_t k, const double* mass, const double* twist, const double*) {
       SupportState& at = before->supports[k];
-      if (at.holds != SupportState::kBody) std::copy_n(twist, 3, at.twist.begin());
+      if (AwayFrom(at, mass, twist) > kSupportAbout) std::copy_n(twist, 3, at.twist.begin());
     });
     return false;
   }

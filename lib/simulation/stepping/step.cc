@@ -413,8 +413,8 @@ ContactSolverReport Stepper::SolveWithContacts(const Model<double>& model,
       // the solution.
       CarryGuess(wider_contacts_, narrow_solution_, Guess::kSameStep);
     }
-    // That rebounds have no solution is dear to find out: they are given up before the solver's last
-    // resorts, which come after all of them.
+    // That rebounds have no solution is dear to find out: they are given up before the solver's
+    // last resorts, which come after all of them.
     const auto rebounds = [&](const ActiveContact& contact) {
       return contact.law == ContactLaw::kRestitution;
     };

@@ -198,8 +198,8 @@ TEST(UntilTest, AnEndWhereASignalStepsIsNamed) {
   }
 }
 
-// A slider that reaches its limit as its joint ends flies on or comes back, also where rounding puts
-// the end before the touch.
+// A slider that reaches its limit as its joint ends flies on or comes back, also where rounding
+// puts the end before the touch.
 TEST(UntilTest, AnEndAtALimitIsAJump) {
   for (const double dt : {0.25, 0.1, 0.05, 0.03}) {
     for (const double later : {0.0, 1e-12, 1e-9}) {
