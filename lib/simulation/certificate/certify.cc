@@ -39,6 +39,10 @@ double ApproachOf(const StepRecord& impact, size_t first, size_t last) {
   return approach;
 }
 
+std::string WhereItSteps(const std::string& which, const std::string& other) {
+  return which + " s is where " + other + " steps";
+}
+
 // What else than `own` jumps at a time, to `near`; empty: nothing does.
 std::string OtherJump(const Model<double>& model, double time, double near,
                       const std::string& own) {
@@ -461,7 +465,7 @@ void RolloutCertifier::AddReleases(const Model<double>& model) {
       OneSided(which + " s is the end of the run");
     } else if (const std::string other = OtherJump(model, time, near, "joint " + joint.name);
                !other.empty()) {
-      OneSided(which + " s is where " + other + " steps");
+      OneSided(WhereItSteps(which, other));
     }
   }
 }
@@ -490,7 +494,7 @@ void RolloutCertifier::AddPaths(const Model<double>& model) {
       } else if (s.settings.stepping == Stepping::kEvent) {
         const std::string other = OtherJump(model, time, kSameInstant * s.settings.dt,
                                             "the speed of body " + s.bodies[index.body].name);
-        if (!other.empty()) OneSided(which + " s is where " + other + " steps");
+        if (!other.empty()) OneSided(WhereItSteps(which, other));
       }
     }
   }
