@@ -229,7 +229,6 @@ bool EventStepper::SolveImpacts(const Model<double>& model, double t, State<doub
     return slow;
   };
   impacts_.Begin(*model.structure);
-  const auto held = outcome->given_up.held_contacts;
   for (;;) {
     const double slow = find_touching();
     const int next = NextToStrike(slow);
@@ -251,10 +250,7 @@ bool EventStepper::SolveImpacts(const Model<double>& model, double t, State<doub
     const bool is_remainder = approach <= kRemainder * struck;
     impacts_.SetStruck(group, approach);
     if (!is_remainder && !CountImpact(model, slow, group, outcome)) {
-      // Contacts that contradict each other and are held may keep what approach they have.
-      if (outcome->given_up.held_contacts == held || approach > HeldSpeed(model)) return false;
-      outcome->message.clear();
-      return true;
+      return false;
     }
     Impulses* impact = ListImpact(model, t, slow, group, *state, outcome);
     impact->remainder = is_remainder;
