@@ -700,7 +700,8 @@ StepReport EventStepper::Advance(const Model<double>& model, double t, double h,
   released_.clear();
   resting_.clear();
   jammed_.clear();
-  limited_ = false;
+  // What supports hold while their friction is sought may have no accelerations.
+  limited_ = !model.structure->supports.empty();
   counts_.Clear();
   shortened_.Clear();
   last_rebounds_.Clear();

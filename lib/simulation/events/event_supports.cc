@@ -33,7 +33,14 @@ bool EventStepper::ChooseModes(const Model<double>& model, const State<double>& 
   listed_friction_ = segment->friction;
   supports_.Begin(model, slow, segment);
   for (;;) {
-    if (!ChooseContactModes(model, slow, slip, outcome, segment)) return false;
+    if (!ChooseContactModes(model, slow, slip, outcome, segment)) {
+      if (!supports_.LetGo(model, &segment->before)) return false;
+      outcome->message.clear();
+      segment->contacts = listed_contacts_;
+      segment->friction = listed_friction_;
+      segment->modes.clear();
+      continue;
+    }
     const bool solved = flow_.Accelerate(model, *segment, segment->before, segment->time, &start_);
     if (solved && supports_.Accept(model, start_.problem, start_.solution, segment)) break;
     if (!solved || supports_.has_given_up()) {

@@ -152,6 +152,7 @@ void SupportModes::Begin(const Model<double>& model, double slow, Segment* segme
   at_rest_.assign(s.supports.size(), 0);
   turned_.assign(s.supports.size(), 0);
   changes_ = 0;
+  times_let_go_ = 0;
   unsettled_ = -1;
   started_ = false;
   for (int k = 0; k < static_cast<int>(s.supports.size()); ++k) {
@@ -160,6 +161,39 @@ void SupportModes::Begin(const Model<double>& model, double slow, Segment* segme
     courses_[k] = CourseOf(model, k, slow, *segment, &at);
     if (courses_[k] == Course::kRests || courses_[k] == Course::kStarts) Seek(k, &at);
   }
+}
+
+// A body that is slow slides on by its velocity.
+void SupportModes::GoOn(const Model<double>& model, int k, State<double>* before) {
+  const SupportIndex& support = model.structure->supports[k];
+  const double* twist = &before->twist[3 * static_cast<size_t>(support.body)];
+  friction_.Set(model, *before, support, 1.0);
+  const double unit =
+      friction_.limit() / model.parameters[model.structure->bodies[support.body].mass] * dt_;
+  SupportState& at = before->supports[k];
+  at = SupportState();
+  std::copy_n(twist, 3, at.twist.begin());
+  courses_[k] = CourseOfPoints(support, kSlowSupport * unit, kStartingSupport * unit, &at);
+  at_rest_[k] = 0;
+  started_ = false;
+}
+
+bool SupportModes::LetGo(const Model<double>& model, State<double>* before) {
+  if (!started_ || ++times_let_go_ > kMostLetGo) return false;
+  bool any = false;
+  for (int k = 0; k < static_cast<int>(before->supports.size()); ++k) {
+    SupportState& at = before->supports[k];
+    if (at_rest_[k] == 0 || at.holds == SupportState::kNothing) continue;
+    any = true;
+    if (courses_[k] == Course::kStarts) {
+      GoOn(model, k, before);
+      continue;
+    }
+    at = SupportState();
+    at.slow = SupportState::kBody;
+    at.is_sought = true;
+  }
+  return any;
 }
 
 // The friction of a body at rest is sought; at first it has none.
@@ -218,15 +252,8 @@ bool SupportModes::Accept(const Model<double>& model, const ContactProblem<doubl
     if (at.holds == SupportState::kNothing && along >= kStartingAlong * sizes && sizes > 0.0) {
       continue;
     }
-    const SupportIndex& support = s.supports[k];
-    const double unit =
-        friction_.limit() / model.parameters[model.structure->bodies[support.body].mass] * dt_;
-    at = SupportState();
-    std::copy_n(twist, 3, at.twist.begin());
-    courses_[k] = CourseOfPoints(support, kSlowSupport * unit, kStartingSupport * unit, &at);
-    at_rest_[k] = 0;
+    GoOn(model, k, &before);
     accepted = false;
-    started_ = false;
   }
   return accepted && settled;
 }

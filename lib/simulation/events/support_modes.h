@@ -40,6 +40,10 @@ class SupportModes {
   /// it is not, changes it in segment->before.
   bool Accept(const Model<double>& model, const ContactProblem<double>& problem,
               const ContactSolution<double>& solution, Segment* segment);
+  /// After accelerations that are not found with what is held at rest, as where a joint turns the
+  /// body about its pivot at a small rate: lets go what is held, a few times in a motion, or lets
+  /// it slide on by its velocity. False where nothing is held.
+  bool LetGo(const Model<double>& model, State<double>* before);
   bool has_given_up() const { return changes_ > kMostChanges || iteration_.has_given_up(); }
   /// Which support has not been accepted.
   int unsettled() const { return unsettled_; }
@@ -55,6 +59,7 @@ class SupportModes {
 
  private:
   static constexpr int kMostChanges = 60;
+  static constexpr int kMostLetGo = 3;
 
   /// What a support does, and why.
   enum class Course : char {
@@ -84,12 +89,14 @@ class SupportModes {
   bool AcceptPoint(int point, const double acceleration[3], double turn, const double* held,
                    int* changes, SupportState* at) const;
   void Seek(int k, SupportState* at);
+  void GoOn(const Model<double>& model, int k, State<double>* before);
   double LongestOf(const Model<double>& model, int k, const double acceleration[3],
                    const Segment& segment);
 
   double start_ = 0.0;  ///< of the step
   double dt_ = 0.0;
   int changes_ = 0;
+  int times_let_go_ = 0;  ///< without accelerations, in this motion
   int unsettled_ = -1;
   bool started_ = false;  ///< the iteration of bodies at rest
   std::vector<Course> courses_;

@@ -361,5 +361,44 @@ TEST(SupportsByEventsTest, WhatOneSupportCannotHoldItsNeighbourShares) {
   }
 }
 
+// An arm on a hinge with friction, whose bob slides on a table that is tilted: it starts from rest,
+// or turns back, where joint and support hold it together up to their limits. Against steps of 1 us
+// of I w' = -g cos a - sign(w) (joint + support).
+TEST(SupportsByEventsTest, AnArmWithFrictionInItsHingeStartsAndTurnsBack) {
+  struct Arm {
+    double g, joint, support, rate;
+  };
+  for (const Arm& arm : {Arm{4.0, 2.0, 1.0, 0.0}, Arm{1.937, 0.271, 0.987, 0.533}}) {
+    Scene scene = SceneOf(R"({"gravity": [0, -4], "bodies": [
+        {"name": "b", "mass": 1, "inertia": 1, "position": [1, 0],
+         "support": {"friction": 0.5, "load": 2}}],
+        "joints": [{"name": "j", "type": "revolute", "bodies": ["b", "world"], "anchor": [0, 0],
+                    "rate": 0, "friction": 2}],
+        "simulation": {"dt": 0.01, "duration": 1, "stepping": "event"}})");
+    scene.gravity.y() = -arm.g;
+    scene.joints[0].friction = arm.joint;
+    scene.joints[0].rate = arm.rate;
+    scene.bodies[0].support->load = arm.support / 0.5;
+    double angle = 0.0, rate = arm.rate;
+    const double h = 1e-6;
+    for (int k = 0; k < 1000000; ++k) {
+      const auto turn = [&](double at, double w) {
+        const double sign = w > 0.0 || (w == 0.0 && arm.rate > 0.0) ? 1.0 : -1.0;
+        return 0.5 * (-arm.g * std::cos(at) - sign * (arm.joint + arm.support));
+      };
+      const double a = turn(angle, rate);
+      const double middle = turn(angle + 0.5 * h * rate, rate + 0.5 * h * a);
+      angle += h * (rate + 0.5 * h * a);
+      rate += h * middle;
+    }
+    const std::vector<std::string> paths = {"joints/j/friction", "bodies/b/support/friction"};
+    const GradientResult result = testing::Jacobian(scene, paths, GradientMethod::kTangent);
+    ASSERT_TRUE(result.done) << result.message;
+    EXPECT_NEAR(result.values[2], angle, 2e-6);
+    EXPECT_NEAR(result.values[5], rate, 2e-6);
+    testing::ExpectOthersAgree(scene, paths, result);
+  }
+}
+
 }  // namespace
 }  // namespace tangible
