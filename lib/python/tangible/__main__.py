@@ -95,7 +95,13 @@ def _plan(file: str, out: str | None, report: str | None) -> str:
 
 
 def _write(file: str, data: dict[str, Any]) -> None:
-    Path(file).write_text(json.dumps(data) + "\n", encoding="utf-8")
+    # What was there stays until the new one is complete.
+    beside = f"{file}.{os.getpid()}.tmp"
+    try:
+        Path(beside).write_text(json.dumps(data) + "\n", encoding="utf-8")
+        os.replace(beside, file)
+    finally:
+        Path(beside).unlink(missing_ok=True)
 
 
 def _same(file: str, other: str) -> bool:

@@ -424,7 +424,7 @@ void RolloutCertifier::AddSplits(const Model<double>& model, long step, const Se
   if (moves && edge_splits_) {
     error = error < 0.0 ? SplitError(model, segment) : error;
     if (error > kSplitMatters) {
-      OneSided("a window's edge at " + Short(segment.time) +
+      OneSided("an edge at " + Short(segment.time) +
                " s is on a step's end: beside it, it splits either step, which changes the "
                "integrator's error");
     }
