@@ -100,6 +100,8 @@ def _write(file: str, data: dict[str, Any]) -> None:
     try:
         Path(beside).write_text(json.dumps(data) + "\n", encoding="utf-8")
         os.replace(beside, file)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, file) from None
     finally:
         Path(beside).unlink(missing_ok=True)
 
