@@ -120,6 +120,7 @@ bool NoiseLikelihood::Create(const FitOptions& options, const Eigen::VectorXd& e
       columns.push_back(free[k]);
     }
     num_intervals_ += run.noise()->num_intervals();
+    constant_ += problem->weight(b) * kSlopeOffset * run.noise()->num_slope_rows();
   }
   return true;
 }
@@ -153,7 +154,7 @@ NoiseLikelihood::Whole NoiseLikelihood::SweepAll(const Eigen::VectorXd& intensit
     twice += root * root * sweep.remainder;
     whole.minus_log += sweep.log_determinant;
   }
-  whole.minus_log += 0.5 * twice + Eliminate(stacked, &whole);
+  whole.minus_log += 0.5 * twice + Eliminate(stacked, &whole) - constant_;
   return whole;
 }
 

@@ -81,6 +81,7 @@ class NoiseLikelihood {
   int threads_ = 0;
   std::vector<std::vector<int>> columns_;  ///< of each recording's parameter, that of F, or −1
   RowMatrixXd priors_;                     ///< rows x [free parameters | 1]
+  double constant_ = 0.0;                  ///< of the rows of slopes, which the cost has not
   int num_free_ = 0;
   double num_intervals_ = 0.0;
 };

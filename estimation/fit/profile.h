@@ -53,6 +53,7 @@ class ProblemWithHeld : public LeastSquaresProblem {
     return problem_->num_observation_rows(block);
   }
   int num_noise_rows(int block) const override { return problem_->num_noise_rows(block); }
+  int num_slope_rows(int block) const override { return problem_->num_slope_rows(block); }
   void SetHuber(double huber) override { problem_->SetHuber(huber); }
   double weight(int block) const override { return problem_->weight(block); }
   std::vector<RowPlace> Places(int block) const override { return problem_->Places(block); }

@@ -80,6 +80,12 @@ inline constexpr double kSettledChange = 1e-3;
 /// Of the derivative of ln L by ln s: an intensity s that the likelihood pulls by less has no
 /// effect on it where it has no curvature either.
 inline constexpr double kUnseenScore = 1e-2;
+/// Of a parameter's deviation at the others held: the distance of the differences of the random
+/// forces' determinant.
+inline constexpr double kSlopeDistance = 0.1;
+/// Of the curvature of the cost: a determinant that bends by more along a parameter is not smooth
+/// there.
+inline constexpr double kSlopeBend = 1.0;
 /// Of one observation: the sigma of a sensor whose observations have a smaller redundancy ρ cannot
 /// be estimated, because they leave no residuals.
 inline constexpr double kLeastRedundancy = 0.5;

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "tangible/estimation/fit/fit_checkpoint.h"
+#include "tangible/estimation/fit/noise_slope.h"
 #include "tangible/estimation/fit/tolerances.h"
 
 namespace tangible {
@@ -48,6 +49,11 @@ bool Update(const FitOptions& options, RecordingsProblem* problem, FitResult* re
                                    &result->message)) {
     return false;
   }
+  components->rough.clear();
+  if (!components->forces.empty() &&
+      !UpdateSlopes(options, *result, problem, largest, &components->rough, &result->message)) {
+    return false;
+  }
   return (components->noise.empty() ||
           UpdateNoise(options, *result, problem, &components->noise, largest, &result->message)) &&
          (!spreads || UpdateSpreads(options, *result, problem, &components->spreads, largest,
@@ -64,6 +70,11 @@ void ConcludeForces(const FitOptions& options, RecordingsProblem* problem, FitRe
     result->uncertainty.warnings.push_back(
         "the observations show no random force of " + NameOf(one.term) +
         ", whose intensity has no interval: the model explains them without it");
+  }
+  for (const std::string& name : components->rough) {
+    result->uncertainty.warnings.push_back(
+        "the random forces are not integrated out along '" + name +
+        "', where their determinant is not smooth: it is the mode beside the forces");
   }
   if (components->forces.empty() || result->estimate.size() == 0) return;
   std::string message;
@@ -109,23 +120,20 @@ FitResult FitWithComponents(const FitOptions& asked, RecordingsProblem* problem,
                             const NextLog& next_log) {
   const FitOptions options = OptionsFor(asked, *problem);
   if (problem->HasNoise()) BeginIntensities(problem);
-  *components = {SensorsToEstimate(*problem), SpreadsOf(*problem), IntensitiesOf(*problem), {}};
+  *components = {SensorsToEstimate(*problem), SpreadsOf(*problem), IntensitiesOf(*problem), {}, {}};
   const auto fit = [&](const FitOptions& how, const FitProgress& told, bool* same) {
     FitLog* const log = next_log ? next_log() : nullptr;
     FitResult result = Fit(how, problem, told, log);
+    RemoveSlopeOffset(*problem, &result);
     *same = log == nullptr || log->mismatch() == 0;
     return result;
   };
   bool same = true;
-  const bool estimates = !components->noise.empty() ||
-                         std::any_of(components->forces.begin(), components->forces.end(),
-                                     [](const NoiseIntensity& one) { return one.estimated; }) ||
+  const bool estimates = !components->noise.empty() || !components->forces.empty() ||
                          std::any_of(components->spreads.begin(), components->spreads.end(),
                                      [](const SpreadEstimate& one) { return one.estimated; });
   if (!estimates) {
-    FitResult result = fit(options, progress, &same);
-    if (same) ConcludeForces(options, problem, &result, components);
-    return result;
+    return fit(options, progress, &same);
   }
   if (std::any_of(components->forces.begin(), components->forces.end(),
                   [](const NoiseIntensity& one) { return one.estimated; })) {

@@ -3,7 +3,7 @@
 //
 // A fit that also estimates variances: the standard deviation of sensors' noise (sensor_noise.h),
 // the spread of parameters that vary from recording to recording (random_effects.h) and the
-// intensity of random forces (noise_intensity.h). Each has
+// intensity of random forces (noise_intensity.h), which are integrated out (noise_slope.h). Each has
 // an equation at the estimate of a fit with given values; fits and equations alternate until no
 // value changes any more.
 
@@ -22,6 +22,7 @@ struct VarianceComponents {
 
   std::vector<NoiseIntensity> forces;  ///< random ones, all of them
   std::vector<SmoothedRun> smoothed;   ///< of each recording, where there are random forces
+  std::vector<std::string> rough;      ///< parameters of UpdateSlopes
 
   bool empty() const { return noise.empty() && spreads.empty() && forces.empty(); }
 };

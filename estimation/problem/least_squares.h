@@ -62,6 +62,9 @@ class LeastSquaresProblem {
   virtual int num_observation_rows(int block) const { return num_rows(block); }
   /// Number of rows of random forces, which follow them (process_noise.h).
   virtual int num_noise_rows(int /*block*/) const { return 0; }
+  /// Number of rows that then give the cost a slope and no curvature (process_noise.h): they are no
+  /// priors, which follow.
+  virtual int num_slope_rows(int /*block*/) const { return 0; }
   /// Huber's bound of the cost whose rows are asked for next, which matters to random forces alone.
   virtual void SetHuber(double /*huber*/) {}
   /// w_b > 0. A block without observation rows is a prior, and has the weight 1.

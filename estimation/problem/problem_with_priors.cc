@@ -72,6 +72,10 @@ int ProblemWithPriors::num_noise_rows(int block) const {
   return IsOfPriors(block) ? 0 : problem_->num_noise_rows(block);
 }
 
+int ProblemWithPriors::num_slope_rows(int block) const {
+  return IsOfPriors(block) ? 0 : problem_->num_slope_rows(block);
+}
+
 double ProblemWithPriors::weight(int block) const {
   return IsOfPriors(block) ? 1.0 : problem_->weight(block);
 }

@@ -50,6 +50,7 @@ class ProblemWithPriors : public LeastSquaresProblem {
   int num_rows(int block) const override;
   int num_observation_rows(int block) const override;
   int num_noise_rows(int block) const override;
+  int num_slope_rows(int block) const override;
   void SetHuber(double huber) override { problem_->SetHuber(huber); }
   double weight(int block) const override;
   std::vector<RowPlace> Places(int block) const override;

@@ -581,9 +581,20 @@ void ProcessNoise::Smooth(const Eigen::VectorXd& p, RolloutResiduals* run, Smoot
   if (huber_ > 0.0) Sweep(Weights::kCurved, smoothed);
 }
 
+double ProcessNoise::LogDeterminant() const {
+  if (huber_ == 0.0) return now_.sweep.log_determinant;
+  return SweepNoise(WithIntensities(intensities_), now_.start).log_determinant;
+}
+
 bool ProcessNoise::Evaluate(const Eigen::VectorXd& p, RolloutResiduals* run,
                             Eigen::VectorXd* residuals, RowMatrixXd* jacobian,
                             std::string* message) {
+  const int slopes = num_slope_rows();
+  const double twice = slopes > 0 ? 2.0 * (kSlopeOffset + slope_.dot(p - slope_at_)) : 0.0;
+  if (slopes > 0 && !(twice > 0.0)) {
+    *message = "the point is too far from where the random forces' determinant was linearised";
+    return false;
+  }
   if (!(now_.valid && now_.path.p == p)) {
     now_.valid = false;
     Smoothed found;
@@ -593,16 +604,18 @@ bool ProcessNoise::Evaluate(const Eigen::VectorXd& p, RolloutResiduals* run,
     now_.valid = true;
   }
   const Eigen::Index observed = now_.path.residuals.size();
-  residuals->resize(observed + num_rows());
+  residuals->setConstant(observed + num_rows() + slopes, std::sqrt(twice));
   residuals->head(observed) = now_.path.residuals;
-  residuals->tail(num_rows()) =
+  residuals->segment(observed, num_rows()) =
       Eigen::Map<const Eigen::VectorXd>(now_.path.epsilon.data(), num_rows());
   if (jacobian == nullptr) return true;
   RowMatrixXd of_observations(observed, p.size());
   RowMatrixXd of_innovations;
   NoiseSensitivity(now_.intervals, now_.sweep, now_.start, &of_observations, &of_innovations);
-  jacobian->resize(observed + num_rows(), p.size());
-  *jacobian << of_observations, of_innovations;
+  jacobian->resize(residuals->size(), p.size());
+  jacobian->topRows(observed) = of_observations;
+  jacobian->middleRows(observed, num_rows()) = of_innovations;
+  if (slopes > 0) jacobian->bottomRows(1) = slope_.transpose() / std::sqrt(twice);
   if (!jacobian->allFinite()) {
     *message = "a derivative is not finite";
     return false;

@@ -25,6 +25,15 @@
 // kSmoothedForces; evaluations of equal bits need an equal history, which does not depend on
 // threads.
 //
+// The p of least cost is the mode of parameters and forces together, which favours a p by which
+// forces move the system more: a damping that is too small, the more so the longer it is observed.
+// With the forces integrated out by (5) of noise_sweep.h the cost of p is higher by D(p) =
+// Σ_k ln |det E_k|. A fit takes its slope into account as one more row (fit/noise_slope.h),
+//
+//   r = √(2 (c + ∇D·(p − p_0))),   r²/2 = D(p) + constant to first order                       (2)
+//
+// where c is so large that r is nearly linear, and the row adds no curvature.
+//
 // References: Y. Trémolet, Q. J. R. Meteorol. Soc. 132 (2006) 2483 (weak constraints); G. H. Golub
 // and V. Pereyra, SIAM J. Numer. Anal. 10 (1973) 413 (variable projection); W. Li and E. Todorov,
 // ICINCO (2004) 222 (runs with gains).
@@ -89,6 +98,9 @@ struct NoisePath {
   double cost = 0.0;
 };
 
+/// c of (2).
+inline constexpr double kSlopeOffset = 1e4;
+
 /// Forces that act in a run as they were found in another one of the same scene; after its end
 /// there are none.
 struct FollowedForces {
@@ -114,16 +126,27 @@ class ProcessNoise {
 
   const Eigen::VectorXd& intensities() const { return intensities_; }
   void SetIntensities(const Eigen::VectorXd& intensities);
-  /// Forgets earlier evaluations, so that the next begins without forces.
+  /// Forgets earlier evaluations and the slope, so that the next begins without forces.
   void Forget() {
     now_.valid = false;
     kept_.valid = false;
+    slope_.resize(0);
   }
+  /// Adds the row (2); `slope` is ∇D at p_0 = `at`.
+  void SetSlope(const Eigen::VectorXd& at, const Eigen::VectorXd& slope) {
+    slope_at_ = at;
+    slope_ = slope;
+  }
+  /// Empty: there is no such row.
+  const Eigen::VectorXd& slope() const { return slope_; }
+  int num_slope_rows() const { return slope_.size() > 0 ? 1 : 0; }
+  /// D at the point of the last evaluation, with the weights of a robust loss that is linearised.
+  double LogDeterminant() const;
   /// Huber's bound of the cost that is minimised; 0: plain squares.
   void SetHuber(double huber);
 
-  /// Residuals of the observations, then ε interval by interval; `jacobian` may be null. False
-  /// where no run is possible: `message`.
+  /// Residuals of the observations, then ε interval by interval and (2); `jacobian` may be null.
+  /// False where no run is possible: `message`.
   bool Evaluate(const Eigen::VectorXd& p, RolloutResiduals* run, Eigen::VectorXd* residuals,
                 RowMatrixXd* jacobian, std::string* message);
 
@@ -167,6 +190,7 @@ class ProcessNoise {
 
   std::vector<NoiseTerm> terms_;
   Eigen::VectorXd intensities_;
+  Eigen::VectorXd slope_at_, slope_;
   double huber_ = 0.0;
   std::vector<long> knots_;
   std::vector<double> lengths_;  ///< s, of the intervals

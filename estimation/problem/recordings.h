@@ -83,6 +83,9 @@ class RecordingsProblem : public LeastSquaresProblem {
   int num_noise_rows(int block) const override {
     return recordings_[block].residuals.num_noise_rows(0);
   }
+  int num_slope_rows(int block) const override {
+    return recordings_[block].residuals.num_slope_rows(0);
+  }
   void SetHuber(double huber) override;
   /// Whether there are random forces.
   bool HasNoise() const { return recordings_.front().residuals.noise() != nullptr; }

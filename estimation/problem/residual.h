@@ -76,9 +76,12 @@ class RolloutResiduals : public LeastSquaresProblem {
   int num_shared() const override { return num_parameters(); }
   int num_blocks() const override { return 1; }
   int num_own(int /*block*/) const override { return 0; }
-  int num_rows(int block) const override { return num_residuals() + num_noise_rows(block); }
+  int num_rows(int block) const override {
+    return num_residuals() + num_noise_rows(block) + num_slope_rows(block);
+  }
   int num_observation_rows(int /*block*/) const override { return num_residuals(); }
   int num_noise_rows(int /*block*/) const override { return noise_ ? noise_->num_rows() : 0; }
+  int num_slope_rows(int /*block*/) const override { return noise_ ? noise_->num_slope_rows() : 0; }
   void SetHuber(double huber) override {
     if (noise_) noise_->SetHuber(huber);
   }

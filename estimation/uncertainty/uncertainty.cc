@@ -335,7 +335,8 @@ class Estimator {
     for (size_t b = 0; b < blocks_.size(); ++b) {
       const int block = static_cast<int>(b);
       const double root = std::sqrt(problem_.weight(block));
-      for (Eigen::Index i = NumDataRows(block); i < blocks_[b].residuals.size(); ++i) {
+      const Eigen::Index first = NumDataRows(block) + problem_.num_slope_rows(block);
+      for (Eigen::Index i = first; i < blocks_[b].residuals.size(); ++i) {
         Eigen::VectorXd moved = Eigen::VectorXd::Zero(estimate_.size());
         for (int local = 0; local < layout_.num_local(block); ++local) {
           const int k = layout_.ParameterOf(block, local);
@@ -379,7 +380,7 @@ class Estimator {
         Eigen::Map<const Eigen::VectorXd>(all.data(), static_cast<Eigen::Index>(all.size()));
   }
 
-  /// Rows of observations and of random forces; what follows are priors.
+  /// Rows of observations and of random forces; what follows are slopes and priors.
   Eigen::Index NumDataRows(int block) const {
     return problem_.num_observation_rows(block) + problem_.num_noise_rows(block);
   }
