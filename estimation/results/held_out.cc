@@ -69,9 +69,9 @@ Eigen::VectorXd KnownValues(const std::vector<ParameterEntry>& entries,
 }
 
 /// Fits the start; false with a message in `run` where there is none.
-bool FitTheStart(const FitOptions& options, const HeldOutRecording& of,
-                 const std::vector<bool>& free, HeldOutRun* run) {
-  if (of.from_observations) {
+bool FitTheStart(const FitOptions& options, bool from_observations, const std::vector<bool>& free,
+                 HeldOutRun* run) {
+  if (from_observations) {
     run->first_part->SetInitial(run->parameters);
     run->parameters = ParametersFromObservations(*run->first_part, free);
   }
@@ -91,52 +91,18 @@ bool FitTheStart(const FitOptions& options, const HeldOutRecording& of,
   return true;
 }
 
-HeldOutRun Predict(const FitInput& input, const RecordingsProblem& problem,
-                   const Eigen::VectorXd& estimate, HeldOutRecording of) {
-  FitProblem& one = of.recording.problem;
-  HeldOutRun run;
-  run.name = of.recording.name;
-  run.state_from = of.state_from;
-  run.place = of.place;
-  ParameterError fault;
-  // Without observations there are no random forces to be found.
-  if (one.observations.empty()) one.process_noise.clear();
-  run.first_part = MakeRun(one, &fault);
-  if (!run.first_part) {
-    run.status = FitStatus::kFailed;
-    run.message = fault.what;
-    return run;
+/// A line, or nothing where no window was looked for.
+std::string DescribeWindow(const StateWindow& window) {
+  if (window.tried.empty()) return "";
+  std::string text = "states are fitted to ";
+  text += window.seconds > 0.0 ? "the last " + CompactNumber(window.seconds, 4) + " s"
+                               : std::string("all observations");
+  text += " before what is predicted; held-out parts of them are predicted with";
+  for (const WindowError& one : window.tried) {
+    text += (one.seconds > 0.0 ? ", " : " ") + CompactNumber(one.error, 4) + " sigma by " +
+            (one.seconds > 0.0 ? CompactNumber(one.seconds, 4) + " s" : std::string("all"));
   }
-  if (run.first_part->noise() != nullptr) {
-    run.first_part->noise()->SetIntensities(
-        problem.recordings().front().residuals.noise()->intensities());
-    run.first_part->SetHuber(input.options().huber);
-  }
-  run.entries = run.first_part->entries();
-  run.parameters = KnownValues(run.entries, problem, estimate);
-  const std::vector<bool> free = OwnStates(one.parameters, input.scopes);
-  for (size_t k = 0; k < free.size(); ++k) {
-    if (free[k]) run.fitted.push_back(static_cast<int>(k));
-  }
-  if (!run.fitted.empty() && !FitTheStart(input.options(), of, free, &run)) {
-    run.parameters.resize(0);
-    run.later.observations = std::move(of.later);
-    return run;
-  }
-  if (run.first_part->num_residuals() > 0 &&
-      run.first_part->Evaluate(run.parameters, input.options().derivatives, &run.residuals,
-                               nullptr)) {
-    const auto count = static_cast<double>(run.residuals.size());
-    run.residual_rms = std::sqrt(run.residuals.squaredNorm() / count);
-  }
-  run.later =
-      PredictLater(one, run.parameters, of.state_from, std::move(of.later), &*run.first_part);
-  if (run.message.empty() && !run.later.score.message.empty()) {
-    run.status = FitStatus::kFailed;
-    run.message =
-        "the run after " + CompactNumber(of.state_from) + " s fails: " + run.later.score.message;
-  }
-  return run;
+  return text + "\n";
 }
 
 std::string DescribeErrors(const HorizonError& error) {
@@ -163,6 +129,81 @@ std::vector<bool> OwnStates(const std::vector<FitParameter>& parameters,
   return own;
 }
 
+HeldOutRun PredictOne(const FitInput& input, const FitOptions& options,
+                      const RecordingsProblem& problem, const Eigen::VectorXd& estimate,
+                      HeldOutRecording of, double seconds) {
+  LateStart late = BeginLate(of.recording.problem, of.state_from, seconds);
+  FitProblem& one = late.problem;
+  HeldOutRun run;
+  run.begins = late.begins;
+  run.used = one.observations;
+  for (Observation& observation : run.used) observation.time += late.begins;
+  run.unused = std::move(late.before);
+  run.name = of.recording.name;
+  run.state_from = of.state_from;
+  run.place = of.place;
+  ParameterError fault;
+  // Without observations there are no random forces to be found.
+  if (one.observations.empty()) one.process_noise.clear();
+  run.first_part = MakeRun(one, &fault);
+  if (!run.first_part) {
+    run.status = FitStatus::kFailed;
+    run.message = fault.what;
+    return run;
+  }
+  if (run.first_part->noise() != nullptr) {
+    run.first_part->noise()->SetIntensities(
+        problem.recordings().front().residuals.noise()->intensities());
+    run.first_part->SetHuber(input.options().huber);
+  }
+  run.entries = run.first_part->entries();
+  run.parameters = KnownValues(run.entries, problem, estimate);
+  const std::vector<bool> free = OwnStates(one.parameters, input.scopes);
+  for (size_t k = 0; k < free.size(); ++k) {
+    if (free[k]) run.fitted.push_back(static_cast<int>(k));
+  }
+  if (!run.fitted.empty() &&
+      !FitTheStart(options, of.from_observations || late.begins > 0.0, free, &run)) {
+    run.parameters.resize(0);
+    run.later.observations = std::move(of.later);
+    return run;
+  }
+  if (run.first_part->num_residuals() > 0 &&
+      run.first_part->Evaluate(run.parameters, input.options().derivatives, &run.residuals,
+                               nullptr)) {
+    const auto count = static_cast<double>(run.residuals.size());
+    run.residual_rms = std::sqrt(run.residuals.squaredNorm() / count);
+  }
+  std::vector<Observation> later = of.later;
+  for (Observation& observation : later) observation.time -= late.begins;
+  run.later = PredictLater(one, run.parameters, of.state_from - late.begins, std::move(later),
+                           &*run.first_part);
+  run.later.observations = std::move(of.later);
+  run.later.score.from = of.state_from;
+  if (run.message.empty() && !run.later.score.message.empty()) {
+    run.status = FitStatus::kFailed;
+    run.message =
+        "the run after " + CompactNumber(of.state_from) + " s fails: " + run.later.score.message;
+  }
+  return run;
+}
+
+namespace {
+
+/// Fits the starts again, to the last observations before T.
+void PredictFromWindow(const FitInput& input, const RecordingsProblem& problem,
+                       const Eigen::VectorXd& estimate,
+                       const std::vector<HeldOutRecording>& recordings, HeldOutRuns* all) {
+  for (size_t i = 0; i < recordings.size(); ++i) {
+    if (!MayBeginLate(recordings[i], all->runs[i])) continue;
+    HeldOutRun late =
+        PredictOne(input, input.options(), problem, estimate, recordings[i], all->window.seconds);
+    if (late.message.empty()) all->runs[i] = std::move(late);
+  }
+}
+
+}  // namespace
+
 HeldOutRuns PredictHeldOut(const FitInput& input, const RecordingsProblem& problem,
                            const Eigen::VectorXd& estimate, const std::vector<SensorNoise>& noise,
                            std::vector<HeldOutRecording> recordings) {
@@ -173,8 +214,10 @@ HeldOutRuns PredictHeldOut(const FitInput& input, const RecordingsProblem& probl
     FitProblem& one = recording.recording.problem;
     ScaleSigma(noise, one.instruments, one.channels, &one.observations);
     ScaleSigma(noise, one.instruments, one.channels, &recording.later);
-    all.runs.push_back(Predict(input, problem, estimate, recording));
+    all.runs.push_back(PredictOne(input, input.options(), problem, estimate, recording, 0.0));
   }
+  all.window = ChooseStateWindow(input, problem, estimate, recordings, all.runs);
+  if (all.window.seconds > 0.0) PredictFromWindow(input, problem, estimate, recordings, &all);
   for (size_t i = 0; i < recordings.size(); ++i) {
     const LaterObservations& later = all.runs[i].later;
     if (later.residuals.size() == 0) continue;
@@ -198,7 +241,8 @@ std::string Describe(const HeldOutRuns& held_out) {
   for (const HeldOutRun& run : held_out.runs) {
     text += "recording '" + run.name + "', held out: ";
     if (std::isfinite(run.residual_rms)) {
-      text += std::to_string(run.residuals.size()) + " observations up to " +
+      text += std::to_string(run.residuals.size()) + " observations " +
+              (run.begins > 0.0 ? "from " + CompactNumber(run.begins) + " " : "") + "up to " +
               CompactNumber(run.state_from) + " s with rms " + CompactNumber(run.residual_rms, 4) +
               " sigma; ";
     }
@@ -214,7 +258,7 @@ std::string Describe(const HeldOutRuns& held_out) {
     text += "prediction of " + std::to_string(error.count) +
             " held-out observations: " + DescribeErrors(error) + "\n";
   }
-  return text;
+  return text + DescribeWindow(held_out.window);
 }
 
 }  // namespace tangible

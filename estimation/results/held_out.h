@@ -3,7 +3,8 @@
 //
 // Recordings that are kept back: they identify nothing. With the parameters found from the others
 // the start of each is fitted to its observations up to a time T, and those after T are predicted,
-// which shows what the parameters are worth in a run that they have not seen.
+// which shows what the parameters are worth in a run that they have not seen. Where the model does
+// not explain the observations up to T, the last of them may give a better start (state_window.h).
 
 #include <Eigen/Core>
 #include <optional>
@@ -12,6 +13,7 @@
 
 #include "tangible/estimation/fit/sensor_noise.h"
 #include "tangible/estimation/results/prediction.h"
+#include "tangible/estimation/results/state_window.h"
 
 namespace tangible {
 
@@ -40,7 +42,10 @@ struct HeldOutRun {
   std::vector<int> fitted;                   ///< indices of those of the start
   Eigen::VectorXd parameters;                ///< all; empty where the fit of the start failed
   Eigen::VectorXd deviations;                ///< standard deviations of those of the start
-  std::optional<RolloutResiduals> first_part;
+  double begins = 0.0;              ///< s: the run begins here, with the state that was fitted
+  std::vector<Observation> unused;  ///< those before
+  std::vector<Observation> used;    ///< those of the first part, from `begins` on
+  std::optional<RolloutResiduals> first_part;  ///< times from `begins` on
   Eigen::VectorXd residuals;  ///< of the first part, in multiples of sigma; empty where it failed
   double residual_rms = NAN;
   LaterObservations later;
@@ -48,6 +53,7 @@ struct HeldOutRun {
 
 struct HeldOutRuns {
   std::vector<HeldOutRun> runs;
+  StateWindow window;
   PredictionScore score;  ///< of all, each from its own T on
 };
 
@@ -58,7 +64,13 @@ HeldOutRuns PredictHeldOut(const FitInput& input, const RecordingsProblem& probl
                            const Eigen::VectorXd& estimate, const std::vector<SensorNoise>& noise,
                            std::vector<HeldOutRecording> recordings);
 
-/// A line a recording, and one of all.
+/// One of them, by a state that is fitted with these options to the last `seconds` before T (0: to
+/// all).
+HeldOutRun PredictOne(const FitInput& input, const FitOptions& options,
+                      const RecordingsProblem& problem, const Eigen::VectorXd& estimate,
+                      HeldOutRecording of, double seconds);
+
+/// A line a recording, one of all, and one of the window where one was looked for.
 std::string Describe(const HeldOutRuns& held_out);
 
 /// What is wrong with the first that failed, after its name; or empty.

@@ -154,12 +154,12 @@ constexpr const char* kColumns =
     "time,target,relative_to,coordinate,file,sensor,used,sigma,observed,predicted,residual,"
     "residual_in_sigma\n";
 
-/// The rows of a run, each after `prefix`; `used` says what for the earlier ones are. Cells stay
-/// empty where there are no values.
+/// The rows of a run, each after `prefix`; `used` says what for those that are `fitted` are. Cells
+/// stay empty where there are no values.
 void AppendRows(const std::string& prefix, const char* used, const RolloutResiduals& residuals,
+                const std::vector<Observation>& fitted,
                 const Eigen::Ref<const Eigen::VectorXd>& values, const LaterObservations* later,
                 std::string* csv) {
-  const std::vector<Observation>& fitted = residuals.observations();
   const size_t num_later = later == nullptr ? 0 : later->observations.size();
   const auto observation = [&](size_t i) -> const Observation& {
     return i < fitted.size() ? fitted[i] : later->observations[i - fitted.size()];
@@ -230,13 +230,16 @@ std::string PredictionCsv(const RecordingsProblem& problem, const Eigen::VectorX
     const RecordedRun& recording = problem.recordings()[b];
     const Eigen::Index rows = recording.residuals.num_residuals();
     AppendRows(problem.IsNamed() ? CsvCell(recording.name) + "," : "", "fit", recording.residuals,
-               values.segment(first, rows), later == nullptr ? nullptr : &later->runs[b], &csv);
+               recording.residuals.observations(), values.segment(first, rows),
+               later == nullptr ? nullptr : &later->runs[b], &csv);
     first += rows;
   }
   if (held_out == nullptr) return csv;
   for (const HeldOutRun& run : held_out->runs) {
     if (!run.first_part) continue;
-    AppendRows(CsvCell(run.name) + ",", "state", *run.first_part, run.residuals, &run.later, &csv);
+    const std::string prefix = CsvCell(run.name) + ",";
+    AppendRows(prefix, "unused", *run.first_part, run.unused, Eigen::VectorXd(), nullptr, &csv);
+    AppendRows(prefix, "state", *run.first_part, run.used, run.residuals, &run.later, &csv);
   }
   return csv;
 }

@@ -83,7 +83,7 @@ struct HeldOutRuns;  // held_out.h
 /// is no run. Recordings follow each other, with their names, where they have any, in a first
 /// column. `values` are the residuals of the fit, in multiples of sigma; `later` may be null, and
 /// so may `held_out`, whose rows come last: `used` is `state` for those to which a start was
-/// fitted.
+/// fitted, and `unused` for those before its window.
 std::string PredictionCsv(const RecordingsProblem& problem, const Eigen::VectorXd& values,
                           const PredictedRecordings* later, const HeldOutRuns* held_out);
 

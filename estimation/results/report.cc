@@ -505,15 +505,16 @@ std::string HeldOutPart(const HeldOutRuns* held_out) {
   for (size_t i = 0; i < std::min(all, kMostRows); ++i) {
     const HeldOutRun& run = held_out->runs[i];
     const HorizonError& error = run.later.score.all;
-    rows.push_back({run.name, CompactNumber(run.state_from, 4),
+    rows.push_back({run.name, CompactNumber(run.begins, 4), CompactNumber(run.state_from, 4),
                     std::to_string(run.residuals.size()), text(run.residual_rms),
                     std::to_string(error.count), text(error.rms_in_sigma), text(error.rms_length),
                     text(error.max_length), text(error.rms_angle), text(error.max_angle),
                     run.message});
   }
   return PredictionPart("Held-out recordings", &held_out->score) + FirstOf(rows.size(), all) +
-         HtmlTable({"recording", "start from (s)", "observations", "rms (sigma)", "predicted",
-                    "rms (sigma)", "rms (m)", "largest (m)", "rms (rad)", "largest (rad)", ""},
+         HtmlTable({"recording", "start at (s)", "from observations up to (s)", "observations",
+                    "rms (sigma)", "predicted", "rms (sigma)", "rms (m)", "largest (m)",
+                    "rms (rad)", "largest (rad)", ""},
                    rows);
 }
 

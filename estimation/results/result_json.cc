@@ -270,6 +270,19 @@ OrderedJson PredictionToJson(const PredictionScore& score) {
           {"horizons", horizons}};
 }
 
+/// The errors of all held-out recordings, and the window of their states where one was looked for.
+OrderedJson HeldOutToJson(const HeldOutRuns& held_out) {
+  OrderedJson json = PredictionToJson(held_out.score);
+  if (held_out.window.tried.empty()) return json;
+  const auto seconds = [](double s) { return s > 0.0 ? OrderedJson(s) : OrderedJson(nullptr); };
+  OrderedJson tried = OrderedJson::array();
+  for (const WindowError& one : held_out.window.tried) {
+    tried.push_back({{"seconds", seconds(one.seconds)}, {"rms_in_sigma", Number(one.error)}});
+  }
+  json["state_window"] = {{"seconds", seconds(held_out.window.seconds)}, {"tried", tried}};
+  return json;
+}
+
 OrderedJson CheckToJson(const std::vector<ParameterEntry>& entries,
                         const DiscretisationCheck& check) {
   OrderedJson parameters = OrderedJson::array();
@@ -327,6 +340,7 @@ OrderedJson HeldOutToJson(const HeldOutRun& run) {
           {"status", NameOf(run.status)},
           {"message", run.message},
           {"state", start},
+          {"state_time", run.begins},
           {"residuals", run.residuals.size()},
           {"residual_rms", Number(run.residual_rms)},
           {"prediction_rms", Number(run.later.score.all.rms_in_sigma)},
@@ -423,7 +437,7 @@ OrderedJson ResultToJson(const RecordingsProblem& problem, const FitResult& resu
     json["prediction"] = PredictionToJson(findings.later->score);
   }
   if (findings.held_out != nullptr) {
-    json["held_out"] = PredictionToJson(findings.held_out->score);
+    json["held_out"] = HeldOutToJson(*findings.held_out);
   }
   if (findings.posterior != nullptr) {
     json["posterior"] = PosteriorToJson(problem.entries(), *findings.posterior);

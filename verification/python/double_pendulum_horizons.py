@@ -8,8 +8,9 @@ markers of the pivot, the joint and the tip, at a nominal 400 Hz, some 43 s each
 identified from both recordings together, from half a second after every 500th frame, each with an
 initial state of its own: lengths, centre of mass and inertia of the links, gravity (the time base
 and the lengths that came with the data do not give 9.81 m/s²) and its direction in the pictures,
-viscous and dry friction in the hinges and quadratic drag. A stretch begins at every 1000th frame:
-its state is fitted to 400 frames, or to the last 200 of them, and the 600 after them are predicted.
+viscous and dry friction in the hinges and quadratic drag. A stretch begins at every 1000th frame,
+and is a recording of the same fit with the role `predict`: its state is fitted to its first 400
+frames, or to as many of the last of them as the fit chooses, and the 600 after them are predicted.
 Printed is the number of frames for which the tip stays within a tenth of the reach.
 """
 
@@ -31,7 +32,6 @@ DT = 1.0 / 400.0  # s
 LINK = 0.091  # m, the first link; the scale of the pictures follows from it
 IDENTIFIED, EVERY = 200, 500  # frames of a part from which parameters are identified
 FITTED, AHEAD, STRIDE = 400, 600, 1000  # frames
-LAST = (400, 200)  # of those fitted: all, or as many of the last ones
 SIGMA = 2e-4  # m
 SHARE = 0.1  # of the reach
 
@@ -129,48 +129,53 @@ def points(values: dict[str, float]) -> dict[str, Any]:
     }
 
 
-def identify(recordings: list[Recording], folder: Path) -> tuple[dict[str, float], tangible.FitResult]:
-    """Parameters from parts of all recordings."""
-    (folder / "scene.json").write_text(json.dumps(scene(BEGIN, IDENTIFIED)))
-    parts = []
+def stretches(recording: Recording) -> range:
+    """The frames at which the stretches of a recording begin."""
+    return range(0, len(recording.tip) - FITTED - AHEAD, STRIDE)
+
+
+def fit(recordings: list[Recording], folder: Path) -> tangible.FitResult:
+    """Parameters from parts of all recordings, and the stretches that they predict."""
+    (folder / "scene.json").write_text(json.dumps(scene(BEGIN, FITTED + AHEAD)))
+    parts: list[dict[str, Any]] = []
+
+    def add(recording: Recording, first: int, count: int, **more: Any) -> None:
+        file = f"{recording.name}_{first}_{count}.csv"
+        recording.observe(folder / file, first, count)
+        parts.append({"name": file[:-4], "initial": recording.guess(first),
+                      "observations": [{"file": file, "sigma": SIGMA}], **more})  # fmt: skip
+
     for recording in recordings:
         for first in range(0, len(recording.tip) - IDENTIFIED, EVERY):
-            file = f"{recording.name}_{first}.csv"
-            recording.observe(folder / file, first, IDENTIFIED)
-            parts.append({"name": f"{recording.name} {first}", "initial": recording.guess(first),
-                          "observations": [{"file": file, "sigma": SIGMA}]})  # fmt: skip
+            add(recording, first, IDENTIFIED)
+    for recording in recordings:
+        for first in stretches(recording):
+            # Half a frame for rounding.
+            add(recording, first, FITTED + AHEAD, role="predict", state_from=(FITTED - 0.5) * DT)
     shared: list[dict[str, Any]] = [
         {"name": name, "sets": SETS[name], "initial": BEGIN[name],
          **({"lower": LOWER[name]} if name in LOWER else {})}
         for name in SETS
     ]  # fmt: skip
     own = [{"name": name, "path": name, "per": "recording"} for name in START]
-    result = tangible.fit(
+    return tangible.fit(
         {"scene": "scene.json", "points": points(BEGIN), "recordings": parts,
          "parameters": shared + own, "loss": {"huber": 3}, "approach": "plain"},
         folder=folder, on_failure="return")  # fmt: skip
-    return {name: result[name] for name in SETS}, result
 
 
-def predict(recording: Recording, first: int, fitted: int, values: dict[str, float],
-            folder: Path) -> tuple[Floats, str]:  # fmt: skip
-    """The tip's distance from where it was seen, as a share of the reach, of the frames ahead; and
-    how the fit of the state at a frame to some after it ended."""
-    frames = fitted + AHEAD
-    (folder / "stretch.json").write_text(json.dumps(scene(values, frames)))
-    recording.observe(folder / "stretch.csv", first, fitted)
-    fit = tangible.fit(
-        {"scene": "stretch.json", "points": points(values), "parameters": START,
-         "observations": [{"file": "stretch.csv", "sigma": SIGMA}]},
-        folder=folder, initial=recording.guess(first), on_failure="return")  # fmt: skip
-    run = tangible.simulate(scene(values, frames), parameters=fit.estimates)
-    cosine, sine = np.cos(run["link2/angle"]), np.sin(run["link2/angle"])
-    x, y = points(values)["tip"]["at"]
-    ahead = slice(fitted, frames)
-    seen = recording.tip[first + fitted : first + frames]
-    off = np.hypot((run["link2/x"] + cosine * x - sine * y)[ahead] - seen[:, 0],
-                   (run["link2/y"] + sine * x + cosine * y)[ahead] - seen[:, 1])  # fmt: skip
-    return off / (values["L1"] + values["L2"]), str(fit.status)
+def tip_errors(result: tangible.FitResult) -> Floats:
+    """The tip's distance from where it was seen, as a share of the reach: a row a stretch, a column
+    a frame ahead."""
+    table = result.predictions
+    ahead: dict[str, dict[str, list[float]]] = {}
+    for name, target, coordinate, used, residual in zip(
+        table["recording"], table["target"], table["coordinate"], table["used"], table["residual"]
+    ):
+        if target == "tip" and used == "prediction":
+            ahead.setdefault(name, {"x": [], "y": []})[coordinate].append(float(residual))
+    reach = result["L1"] + result["L2"]
+    return np.array([np.hypot(off["x"], off["y"]) / reach for off in ahead.values()])
 
 
 def plot(errors: Floats, file: str) -> None:
@@ -203,33 +208,33 @@ def main() -> int:
     recordings = [
         Recording(Path(sys.argv[1]) / "ibm_double_pendulum" / f"{name}.csv") for name in "05"
     ]
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        values, result = identify(recordings, folder)
-        rms = 1e3 * SIGMA * result.data["residual_rms"]
-        print(f"{result.data['residuals']} residuals of {len(result.data['recordings'])} parts, "
-              f"{result.status}, residual rms {rms:.2g} mm")  # fmt: skip
-        for name in SETS:
-            print(f"  {name:3s} {values[name]:.5g}")
-        print(f"frames for which the tip stays within {100 * SHARE:g} % of the reach, at most {AHEAD}")
-        all_failed = 0
-        for last in LAST:
-            errors, failed = [], 0
-            for recording in recordings:
-                for first in range(0, len(recording.tip) - FITTED - AHEAD, STRIDE):
-                    error, status = predict(recording, first + FITTED - last, last, values, folder)
-                    errors.append(error)
-                    failed += status != "converged"
-            far = np.array(errors) > SHARE
-            horizons = np.where(far.any(axis=1), far.argmax(axis=1), AHEAD)
-            low, middle, high = np.percentile(horizons, [25, 50, 75])
-            print(f"  state from {last} frames: median {middle:.0f}, quartiles {low:.0f} and {high:.0f}; "
-                  f"{failed} of {len(horizons)} stretches do not fit")  # fmt: skip
-            print("    " + " ".join(str(h) for h in np.sort(horizons)))
-            all_failed += failed
+    with tempfile.TemporaryDirectory() as folder:
+        result = fit(recordings, Path(folder))
+    identified = [part for part in result.data["recordings"] if part["role"] == "identify"]
+    kept = [part for part in result.data["recordings"] if part["role"] == "predict"]
+    rms = 1e3 * SIGMA * result.data["residual_rms"]
+    print(f"{result.data['residuals']} residuals of {len(identified)} parts, "
+          f"{result.status}, residual rms {rms:.2g} mm")  # fmt: skip
+    for name in SETS:
+        print(f"  {name:3s} {result[name]:.5g}")
+    window = result.data["held_out"].get("state_window", {"seconds": None, "tried": []})
+    print("states from the last frames, and what they predict of frames that are known (sigma)")
+    for one in window["tried"]:
+        frames = "all" if one["seconds"] is None else f"{one['seconds'] / DT:.0f}"
+        chosen = " chosen" if one["seconds"] == window["seconds"] else ""
+        print(f"  {frames:>3s} {one['rms_in_sigma']:.3g}{chosen}")
+    failed = sum(part["status"] != "converged" for part in kept)
+    errors = tip_errors(result)
+    far = errors > SHARE
+    horizons = np.where(far.any(axis=1), far.argmax(axis=1), AHEAD)
+    low, middle, high = np.percentile(horizons, [25, 50, 75])
+    print(f"frames for which the tip stays within {100 * SHARE:g} % of the reach, at most {AHEAD}")
+    print(f"  median {middle:.0f}, quartiles {low:.0f} and {high:.0f}; "
+          f"{failed} of {len(kept)} stretches do not fit")  # fmt: skip
+    print("  " + " ".join(str(h) for h in np.sort(horizons)))
     if len(sys.argv) == 3:
-        plot(np.array(errors), sys.argv[2])
-    return 1 if all_failed else 0
+        plot(errors, sys.argv[2])
+    return 1 if failed else 0
 
 
 if __name__ == "__main__":
