@@ -126,6 +126,24 @@ def test_a_file_is_that_of_the_program(tmp_path: Path) -> None:
     assert (tmp_path / "python.csv").read_bytes() == (tmp_path / "program.csv").read_bytes()
 
 
+def test_a_file_is_written_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    run = tangible.simulate(ball())
+    kept, link = tmp_path / "kept.csv", tmp_path / "link.csv"
+    kept.write_text("old")
+    link.symlink_to(kept)
+    run.to_csv(link)
+    assert link.is_symlink() and kept.read_text().startswith("time,")
+
+    def fail(*_: object, **__: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    kept.write_text("old")
+    monkeypatch.setattr("os.replace", fail)
+    with pytest.raises(OSError, match=r"No space left on device: '.*kept\.csv'"):
+        run.to_csv(kept)
+    assert kept.read_text() == "old" and sorted(p.name for p in tmp_path.iterdir()) == ["kept.csv", "link.csv"]
+
+
 def test_plots_have_units_and_merge_their_spans() -> None:
     matplotlib = pytest.importorskip("matplotlib")
     matplotlib.use("Agg")

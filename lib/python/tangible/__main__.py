@@ -9,9 +9,9 @@ import sys
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from . import TangibleError, fit, plan, simulate
+from ._plain import write_whole
 from ._problem import object_of, text_of
 from ._trajectory import COMPONENTS, UNITS
 
@@ -78,7 +78,7 @@ def _fit(file: str, out: str | None, report: str | None) -> str:
     if report is not None and found.report():
         found.report(report)
     if out is not None:
-        _write(out, found.data)
+        write_whole(out, json.dumps(found.data) + "\n")
     return "" if found.status == "converged" else f"{file}: {found.status}: {found.message}"
 
 
@@ -90,20 +90,8 @@ def _plan(file: str, out: str | None, report: str | None) -> str:
     elif out is not None and out.endswith(".html"):
         found.show(out)
     elif out is not None:
-        _write(out, found.data)
+        write_whole(out, json.dumps(found.data) + "\n")
     return "" if found.holds else f"{file}: {found.status}: {found.message}"
-
-
-def _write(file: str, data: dict[str, Any]) -> None:
-    # What was there stays until the new one is complete.
-    beside = f"{file}.{os.getpid()}.tmp"
-    try:
-        Path(beside).write_text(json.dumps(data) + "\n", encoding="utf-8")
-        os.replace(beside, file)
-    except OSError as error:
-        raise OSError(error.errno, error.strerror, file) from None
-    finally:
-        Path(beside).unlink(missing_ok=True)
 
 
 def _same(file: str, other: str) -> bool:

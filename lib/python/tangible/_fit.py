@@ -12,7 +12,6 @@ import re
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Tuple, Union
 
 import numpy as np
@@ -20,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _core, _executor
 from ._certificate import Certificate
-from ._plain import choice, file_name, flag, function, number, plain, seed_of, text, whole
+from ._plain import choice, file_name, flag, function, number, plain, seed_of, text, whole, write_whole
 from ._plain import paths as names
 from ._problem import Problem, make, of_data, text_of
 from ._rollout import finite, floats
@@ -413,7 +412,7 @@ class FitResult:
     def report(self, file: str | os.PathLike[str] | None = None) -> str:
         """The report as a page; written to a file if one is named."""
         if file is not None:
-            Path(file_name(file, "file")).write_text(self._page, encoding="utf-8")
+            write_whole(file, self._page)
         return self._page
 
     def _repr_html_(self) -> str:

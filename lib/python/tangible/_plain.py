@@ -7,6 +7,7 @@ import operator
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from numbers import Integral, Real
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -178,3 +179,19 @@ def file_name(value: Any, name: str, what: str = "a file's name") -> str:
     if not isinstance(found, str):
         raise TypeError(f"{name}: expected {what}, got {type(value).__name__}")
     return found
+
+
+def write_whole(file: Any, content: str) -> None:
+    """Writes a text file; what was there stays until the new one is complete."""
+    name = file_name(file, "file")
+    if os.path.exists(name) and not os.path.isfile(name):  # a pipe, or the terminal
+        Path(name).write_text(content, encoding="utf-8")
+        return
+    beside = f"{os.path.realpath(name)}.{os.getpid()}.tmp"
+    try:
+        Path(beside).write_text(content, encoding="utf-8")
+        os.replace(beside, os.path.realpath(name))
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, name) from None
+    finally:
+        Path(beside).unlink(missing_ok=True)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from . import _core
 from ._certificate import Certificate
-from ._plain import choice, file_name, flag, function, mapping, number, plain, text, whole
+from ._plain import choice, file_name, flag, function, mapping, number, plain, text, whole, write_whole
 from ._problem import Maker, Problem, object_of, text_of
 from ._rollout import MOST_THREADS, floats
 from ._scene import Scene, SceneLike
@@ -72,11 +72,11 @@ class _Controlled:
     def save(self, file: str | os.PathLike[str]) -> None:
         """Writes the controls as `tangible-control --plan` does: a problem with
         `"initial": {"file": ...}` goes on from them."""
-        Path(file_name(file, "file")).write_text(self._table, encoding="utf-8")
+        write_whole(file, self._table)
 
     def to_csv(self, file: str | os.PathLike[str]) -> None:
         """Writes the motion as a trajectory file, as `tangible-control --trajectory` does."""
-        Path(file_name(file, "file")).write_text(self._trajectory, encoding="utf-8")
+        write_whole(file, self._trajectory)
 
     def html(self) -> str:
         """The animated page, as `tangible-control --view` writes it."""

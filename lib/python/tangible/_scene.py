@@ -11,7 +11,7 @@ from types import MappingProxyType
 from typing import Any, Union
 
 from . import _core
-from ._plain import file_name, mapping, plain, text
+from ._plain import file_name, mapping, plain, text, write_whole
 
 SceneLike = Union["Scene", Mapping[str, Any], str, "os.PathLike[str]"]
 _EXPECTED = "a Scene, a scene file or a dict of its JSON"
@@ -166,7 +166,7 @@ class Scene:
 
     def save(self, file: str | os.PathLike[str]) -> None:
         """Writes a scene file, with the series of its signals: it can be read in any folder."""
-        Path(file_name(file, "file")).write_text(self.core.to_whole_json() + "\n", encoding="utf-8")
+        write_whole(file, self.core.to_whole_json() + "\n")
 
     def with_parameters(self, parameters: Mapping[str, float]) -> Scene:
         """The scene with other values of parameters: {path: value in SI units}.

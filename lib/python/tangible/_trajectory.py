@@ -8,7 +8,6 @@ import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Union
 
 import numpy as np
@@ -16,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _core
 from ._certificate import Certificate
-from ._plain import choice, file_name, flag, mapping, text, whole
+from ._plain import choice, flag, mapping, text, whole, write_whole
 from ._rollout import Numbers, Rollout, finite
 from ._scene import Scene, SceneLike
 from ._warning import warn
@@ -99,7 +98,7 @@ class Events:
 def display(page: Any, file: str | os.PathLike[str] | None) -> None:
     """Plays a page in a notebook, or writes it to a file: `show` of what has an `html()`."""
     if file is not None:
-        Path(file_name(file, "file")).write_text(page.html(), encoding="utf-8")
+        write_whole(file, page.html())
         return
     try:
         ipython = importlib.import_module("IPython")
@@ -232,7 +231,7 @@ class Trajectory:
         for time, poses, twists in zip(self.times, self.poses, self.twists):
             for body, numbers in zip(self.bodies, np.concatenate([poses, twists], axis=1)):
                 rows.append(",".join([f"{time:.17g}", body, *(f"{x:.17g}" for x in numbers)]))
-        Path(file_name(file, "file")).write_text("\n".join(rows) + "\n", encoding="utf-8")
+        write_whole(file, "\n".join(rows) + "\n")
 
     @property
     def final(self) -> dict[str, float]:
