@@ -48,7 +48,8 @@ struct Impulses : StepRecord {
   bool decompression = false;   ///< of the impulses found by the part before
   bool remainder = false;       ///< of what rounding left of the approach of the impact before it
   std::vector<int> compressed;  ///< decompression: each contact's index in that part
-  /// Behind edges of one instant: what holds has no speed, but a derivative of one until here.
+  /// Behind edges of one instant, or at rest on supports: what holds has no speed, but a derivative
+  /// of one until here.
   bool holds = false;
 };
 

@@ -3,6 +3,7 @@
 // The modes of a motion: of its contacts, and of its supports, whose friction and the contacts'
 // forces determine each other.
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "tangible/simulation/events/event_step.h"
@@ -32,6 +33,15 @@ bool EventStepper::ChooseModes(const Model<double>& model, const State<double>& 
   listed_contacts_ = segment->contacts;
   listed_friction_ = segment->friction;
   supports_.Begin(model, slow, segment);
+  // Bodies that come to rest on their supports leave a joint between them the rounding of their
+  // speeds.
+  for (size_t i = 0; i < slip.size(); ++i) {
+    const ActiveContact& contact = listed_contacts_[i];
+    if (supports_.IsAtRest(model, segment->before, contact.a) &&
+        supports_.IsAtRest(model, segment->before, contact.b)) {
+      slip[i] = 0.0;
+    }
+  }
   for (;;) {
     if (!ChooseContactModes(model, slow, slip, outcome, segment)) {
       if (!supports_.LetGo(model, &segment->before)) return false;
@@ -43,7 +53,8 @@ bool EventStepper::ChooseModes(const Model<double>& model, const State<double>& 
     }
     const bool solved = flow_.Accelerate(model, *segment, segment->before, segment->time, &start_);
     if (solved && supports_.Accept(model, start_.problem, start_.solution, segment)) break;
-    if (!solved || supports_.has_given_up()) {
+    const bool goes_on = solved && supports_.GoOnInstead(model, &segment->before);
+    if (!solved || (supports_.has_given_up() && !goes_on)) {
       outcome->message = "accelerations";
       if (supports_.unsettled() >= 0) {
         const SupportIndex& support = model.structure->supports[supports_.unsettled()];
@@ -52,6 +63,9 @@ bool EventStepper::ChooseModes(const Model<double>& model, const State<double>& 
       }
       return false;
     }
+    // What is held has no speed, before its forces are sought: where joints and supports hold a
+    // body together their rows contradict each other by the rounding of its speed.
+    if (supports_.HasToStop(model, *segment) && !supports_.HoldsStarting(*segment)) return true;
     segment->contacts = listed_contacts_;
     segment->friction = listed_friction_;
     segment->modes.clear();
@@ -77,17 +91,23 @@ bool EventStepper::StopSupports(const Model<double>& model, const Segment& segme
   Impulses& stop = part->impulses;
   SetUpProjection(held, *state, &stop);
   stop.before.supports = supports;
+  stop.holds = true;
   if (!flow_.Project(model, &stop)) {
     outcome->message = "twists of bodies that come to rest on their supports";
     return false;
   }
+  const std::vector<double> before = state->twist;
   SpreadTwists(s, stop.solution.motion, &state->twist);
   for (size_t k = 0; k < s.supports.size(); ++k) {
     const bool centre = s.supports[k].kind == SupportIndex::kCentre;
     const int held_rows = supports[k].holds == SupportState::kBody ? 3
                           : supports[k].holds >= 0 && centre       ? 2
                                                                    : 0;
-    std::fill_n(state->twist.begin() + 3 * s.supports[k].body, held_rows, 0.0);
+    const auto twist = state->twist.begin() + 3 * s.supports[k].body;
+    std::fill_n(twist, held_rows, 0.0);
+    // A joint may keep a body from turning about its held centre.
+    const double turned = before[static_cast<size_t>(3 * s.supports[k].body + 2)];
+    if (held_rows == 2 && std::abs(twist[2]) <= kStoppedTurn * std::abs(turned)) twist[2] = 0.0;
   }
   stop.new_twist = state->twist;
   supports_.Stopped();

@@ -79,6 +79,8 @@ void SupportModes::StartStep(const ModelStructure& structure, double t) {
   dt_ = structure.settings.dt;
   rested_.clear();
   let_go_.assign(structure.supports.size(), SupportState());
+  speeds_.assign(structure.supports.size(), 0.0);
+  last_speeds_ = speeds_;
 }
 
 void SupportModes::TakeEvent(const Segment& segment) {
@@ -92,6 +94,7 @@ void SupportModes::TakeEvent(const Segment& segment) {
 
 void SupportModes::Moved() {
   rested_.clear();
+  last_speeds_ = speeds_;
   for (SupportState& one : let_go_) one.slow = SupportState::kNothing;
 }
 
@@ -112,9 +115,11 @@ SupportModes::Course SupportModes::CourseOf(const Model<double>& model, int k, d
     const bool found = std::any_of(rested_.begin(), rested_.end(), [&](const Rested& one) {
       return one.support == k && (one.part == part || one.part == SupportState::kBody);
     });
-    return SpeedOfPart(friction_, part, twist) <= (found ? 2.0 * stops : slow);
+    return SpeedOfPart(friction_, part, twist) <=
+           (found ? 2.0 * stops : std::max(slow, kStandingPoint * unit * dt_));
   };
   const double speed = SpeedOfPart(friction_, SupportState::kBody, twist);
+  speeds_[k] = speed;
   const int whole =
       support.kind == SupportIndex::kCentre ? 0 : static_cast<int>(SupportState::kBody);
   if (rests(whole)) return Course::kRests;
@@ -127,21 +132,24 @@ SupportModes::Course SupportModes::CourseOf(const Model<double>& model, int k, d
     return Course::kStops;
   }
   if (at->holds != SupportState::kNothing) return Course::kTurns;
-  // Whether it starts, its acceleration from rest tells.
-  if (speed <= kStartingSupport * unit * dt_) return Course::kStarts;
+  // Whether it starts, its acceleration from rest tells. What was faster before does not.
+  const bool has_slowed = speed < last_speeds_[k];
+  if (speed <= kStartingSupport * unit * dt_ && !has_slowed) return Course::kStarts;
   return CourseOfPoints(support, stops, kStartingSupport * unit * dt_, at);
 }
 
-// Of a body that is not at rest and does not start: whether one of its points is slow.
+// Of a body that is not at rest and does not start: whether its slowest point is slow.
 SupportModes::Course SupportModes::CourseOfPoints(const SupportIndex& support, double stops,
                                                   double starts, SupportState* at) {
+  double least = std::max(stops, starts);
   for (int i = 0; support.kind == SupportIndex::kPoints && i < support.num_points; ++i) {
     const double speed = SpeedOfPart(friction_, i, at->twist.data());
-    if (speed > std::max(stops, starts)) continue;
+    if (speed > least || (speed == least && at->slow != SupportState::kNothing)) continue;
     at->slow = i;
-    return speed <= stops ? Course::kStops : Course::kPasses;
+    least = speed;
   }
-  return Course::kSlides;
+  if (at->slow == SupportState::kNothing) return Course::kSlides;
+  return least <= stops ? Course::kStops : Course::kPasses;
 }
 
 void SupportModes::Begin(const Model<double>& model, double slow, Segment* segment) {
@@ -193,6 +201,18 @@ bool SupportModes::LetGo(const Model<double>& model, State<double>* before) {
     at.slow = SupportState::kBody;
     at.is_sought = true;
   }
+  return any;
+}
+
+bool SupportModes::GoOnInstead(const Model<double>& model, State<double>* before) {
+  bool any = false;
+  if (changes_ <= kMostOfSlow) return any;
+  for (int k = 0; k < static_cast<int>(before->supports.size()); ++k) {
+    if (courses_[k] != Course::kStarts) continue;
+    GoOn(model, k, before);
+    any = true;
+  }
+  if (any) changes_ = 0;
   return any;
 }
 
@@ -350,6 +370,17 @@ bool SupportModes::AcceptOne(const Model<double>& model, int k,
   return false;
 }
 
+bool SupportModes::IsAtRest(const Model<double>& model, const State<double>& before,
+                            int body) const {
+  if (body < 0) return true;
+  const ModelStructure& s = *model.structure;
+  for (size_t k = 0; k < s.supports.size(); ++k) {
+    if (s.supports[k].body == body) return courses_[k] == Course::kRests;
+  }
+  const double* twist = &before.twist[3 * static_cast<size_t>(body)];
+  return s.bodies[body].mass < 0 && twist[0] == 0.0 && twist[1] == 0.0 && twist[2] == 0.0;
+}
+
 bool SupportModes::HasToStop(const Model<double>& model, const Segment& segment) const {
   const ModelStructure& s = *model.structure;
   for (size_t k = 0; k < s.supports.size(); ++k) {
@@ -363,6 +394,16 @@ bool SupportModes::HasToStop(const Model<double>& model, const Segment& segment)
       if (twist[0] != 0.0 || twist[1] != 0.0) return true;
     } else if (std::any_of(rested_.begin(), rested_.end(),
                            [&](const Rested& one) { return one.support == static_cast<int>(k); })) {
+      return true;
+    }
+  }
+  return false;
+}
+
+bool SupportModes::HoldsStarting(const Segment& segment) const {
+  for (size_t k = 0; k < courses_.size(); ++k) {
+    if (courses_[k] == Course::kStarts &&
+        segment.before.supports[k].holds != SupportState::kNothing) {
       return true;
     }
   }

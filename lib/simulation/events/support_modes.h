@@ -44,13 +44,22 @@ class SupportModes {
   /// body about its pivot at a small rate: lets go what is held, a few times in a motion, or lets
   /// it slide on by its velocity. False where nothing is held.
   bool LetGo(const Model<double>& model, State<double>* before);
+  /// After friction of bodies at rest that does not settle, as where a slow body is held by a joint
+  /// that still slides: slow bodies slide on by their velocities. False where there are none, or it
+  /// may yet settle.
+  bool GoOnInstead(const Model<double>& model, State<double>* before);
   bool has_given_up() const { return changes_ > kMostChanges || iteration_.has_given_up(); }
   /// Which support has not been accepted.
   int unsettled() const { return unsettled_; }
 
+  /// Whether a body begins the motion at rest: one with a support that is, or one that does not
+  /// move at all.
+  bool IsAtRest(const Model<double>& model, const State<double>& before, int body) const;
   /// Whether a body that is held in the motion, or its point, still has a speed at its start that
   /// must be taken from it.
   bool HasToStop(const Model<double>& model, const Segment& segment) const;
+  /// Whether a body that is slow, and not at rest, is held while its friction is sought.
+  bool HoldsStarting(const Segment& segment) const;
   /// Shortens the motion to what its supports allow, to a multiple of dt / 2^k since the start of
   /// the step: near states have the same k, so that its end is a given instant and derivatives are
   /// exact. `accelerations`: those at its start, three for each moving body.
@@ -60,6 +69,7 @@ class SupportModes {
  private:
   static constexpr int kMostChanges = 60;
   static constexpr int kMostLetGo = 3;
+  static constexpr int kMostOfSlow = 12;  ///< changes where a body is slow, and need not be at rest
 
   /// What a support does, and why.
   enum class Course : char {
@@ -101,6 +111,7 @@ class SupportModes {
   bool started_ = false;  ///< the iteration of bodies at rest
   std::vector<Course> courses_;
   std::vector<char> at_rest_;
+  std::vector<double> speeds_, last_speeds_;  ///< of supports, in this motion and the one before
   std::vector<int> turned_;  ///< how often the direction of a support has been changed
   std::vector<Rested> rested_;
   std::vector<SupportState> let_go_;  ///< by support; `slow` is kNothing: it is not let go

@@ -222,6 +222,9 @@ inline constexpr double kSupportTurn = 1.0 / 16.0;
 /// Times the rate at which friction turns a velocity into the direction of its point's motion: a
 /// motion is no longer, by which one of fourth order is stable and its error as small as above.
 inline constexpr double kSupportDecay = 0.5;
+/// Of the rate before: a body whose centre is stopped and that a joint keeps from turning about it
+/// has a smaller one by rounding alone.
+inline constexpr double kStoppedTurn = 1e-9;
 /// Of dt / 2^k: motions at supports end at multiples of it, up to the rounding of a time.
 inline constexpr double kSupportGridSlack = 1e-3;
 /// The norm of the difference of two unit vectors: the direction in which a point of a support

@@ -400,5 +400,129 @@ TEST(SupportsByEventsTest, AnArmWithFrictionInItsHingeStartsAndTurnsBack) {
   }
 }
 
+// The same without gravity in the plane: joint and support bring it to rest together, within a step
+// or on a step's end, and hold it, which either could do alone. Angle w^2 / (2 a).
+TEST(SupportsByEventsTest, AnArmWithFrictionInItsHingeComesToRest) {
+  struct Arm {
+    double joint, rate;
+    const char* support;
+  };
+  const char centre[] = R"({"friction": 0.1})";
+  // Of a = 2.5 rad/s² in the first: it stops at 0.2 s.
+  for (const Arm& arm :
+       {Arm{0.2057, 0.5, centre}, Arm{0.3, 1.0, centre}, Arm{0.05, 0.37, centre},
+        Arm{0.3, 0.37, R"({"friction": 0.1, "radius": 0.1})"},
+        Arm{0.05, 2.0, R"({"friction": 0.1, "points": [[0.1, 0], [-0.1, 0.05]]})"}}) {
+    Scene scene = SceneOf(std::string(R"({"gravity": [0, 0], "bodies": [
+        {"name": "b", "mass": 0.5, "inertia": 0.02, "position": [0.6, 0], "support": )") +
+                          arm.support + R"(}], "joints": [{"name": "j", "type": "revolute",
+        "bodies": ["b", "world"], "anchor": [0, 0], "rate": 0, "friction": 0}],
+        "simulation": {"dt": 0.01, "duration": 2, "stepping": "event"}})");
+    scene.joints[0].friction = arm.joint;
+    scene.joints[0].rate = arm.rate;
+    const std::vector<std::string> paths = {"joints/j/rate", "joints/j/friction",
+                                            "bodies/b/support/friction"};
+    const GradientResult result = Jacobian(scene, paths, GradientMethod::kTangent);
+    ASSERT_TRUE(result.done) << result.message;
+    EXPECT_EQ(result.values[3], 0.0);
+    EXPECT_EQ(result.values[4], 0.0);
+    EXPECT_EQ(result.values[5], 0.0);
+    EXPECT_EQ(result.certificate.verdict, "trustworthy");
+    if (arm.rate == 0.5 || arm.rate == 2.0) ExpectOthersAgree(scene, paths, result);
+    if (arm.support != centre) continue;
+    const double slows = (arm.joint + 0.1 * 0.5 * kStandardG * 0.6) / 0.2;
+    const double angle = arm.rate * arm.rate / (2.0 * slows);
+    EXPECT_NEAR(result.values[2], angle, 1e-9);
+    EXPECT_NEAR(result.jacobian(2, 0), arm.rate / slows, 1e-7);
+    EXPECT_NEAR(result.jacobian(2, 1), -angle / slows / 0.2, 1e-7);
+  }
+}
+
+// An arm of two links, each on the table: one comes to rest while the other still turns, and both
+// rest in the end.
+TEST(SupportsByEventsTest, AnArmOfTwoLinksComesToRest) {
+  Scene scene = SceneOf(R"({"gravity": [0, 0], "bodies": [
+        {"name": "b", "mass": 0.5, "inertia": 0.02, "position": [0.6, 0], "support": {"friction": 0.2}},
+        {"name": "c", "mass": 0.3, "inertia": 0.01, "position": [1.2, 0], "support": {"friction": 0.3}}],
+        "joints": [{"name": "j", "type": "revolute", "bodies": ["b", "world"], "anchor": [0, 0],
+                    "rate": 1, "friction": 0.05},
+                   {"name": "k", "type": "revolute", "bodies": ["c", "b"], "anchor": [0.9, 0],
+                    "rate": -0.7, "friction": 0.02}],
+        "simulation": {"dt": 0.01, "duration": 1, "stepping": "event"}})");
+  const std::vector<std::string> paths = {"joints/j/rate", "bodies/c/support/friction"};
+  const GradientResult result = Jacobian(scene, paths, GradientMethod::kTangent);
+  ASSERT_TRUE(result.done) << result.message;
+  for (const int i : {3, 4, 5, 9, 10, 11}) EXPECT_EQ(result.values[i], 0.0) << i;
+  EXPECT_EQ(result.certificate.verdict, "trustworthy");
+  for (const GradientMethod method :
+       {GradientMethod::kAdjoint, GradientMethod::kFiniteDifference}) {
+    const GradientResult other = Jacobian(scene, paths, method);
+    ASSERT_TRUE(other.done) << other.message;
+    EXPECT_LT((other.jacobian - result.jacobian).norm(), 1e-6 * result.jacobian.norm());
+  }
+  scene.simulation.stepping = Stepping::kFixed;
+  scene.simulation.dt = 2e-4;
+  const GradientResult fixed = Jacobian(scene, {"joints/j/rate"}, GradientMethod::kTangent);
+  ASSERT_TRUE(fixed.done) << fixed.message;
+  EXPECT_NEAR(result.values[2], fixed.values[2], 4e-4);
+  EXPECT_NEAR(result.values[8], fixed.values[8], 6e-4);
+}
+
+// It turns about its centre until one of its feet rests; that the other is slow does not matter.
+TEST(SupportsByEventsTest, ARodThatSpinsAndBarelySlides) {
+  for (const double speed : {1e-3, -1e-3, 1e-4, 1e-6}) {
+    for (const int axis : {0, 1}) {
+      Scene scene = TableByEvents(
+          R"("inertia": 0.04, "position": [0, 0], "angular_velocity": 3,
+             "support": {"friction": 0.2, "points": [[0.1, 0], [-0.1, 0]]})",
+          0.01, 1.0);
+      scene.bodies[0].velocity[axis] = speed;
+      const std::vector<std::string> paths = {"bodies/b/angular_velocity",
+                                              "bodies/b/support/friction"};
+      const GradientResult result = Jacobian(scene, paths, GradientMethod::kTangent);
+      ASSERT_TRUE(result.done) << speed << " along " << axis << ": " << result.message;
+      EXPECT_EQ(result.values[5], 0.0);
+      const double slows = 0.1 * 0.2 * 2.0 * kStandardG / 0.04;
+      EXPECT_NEAR(result.values[2], 9.0 / (2.0 * slows), 3e-3 * std::abs(speed) + 1e-9);
+      EXPECT_NEAR(result.jacobian(2, 0), 3.0 / slows, 3e-3 * std::abs(speed) + 1e-8);
+    }
+  }
+}
+
+// Pucks that are tied or touch stop together, also where one alone would stop a little earlier.
+TEST(SupportsByEventsTest, PucksThatStopNearlyTogether) {
+  const char tie[] = R"(, "joints": [{"name": "j", "type": "distance", "bodies": ["a", "b"],
+                         "anchors": [[0, 0], [0.3, 0]]}])";
+  const char weld[] = R"(, "joints": [{"name": "j", "type": "weld", "bodies": ["a", "b"],
+                          "anchor": [0.15, 0]}])";
+  for (const char* joined : {tie, weld, ""}) {
+    for (const double more : {0.0, -2e-4}) {
+      for (const double faster : {0.0, 6e-6}) {
+        Scene scene = SceneOf(
+            std::string(R"({"gravity": [0, 0], "bodies": [
+            {"name": "a", "shape": {"circle": {"radius": 0.05}}, "mass": 0.2, "position": [0, 0],
+             "velocity": [1, 0], "friction": 0.1, "support": {"friction": 0.2}},
+            {"name": "b", "shape": {"circle": {"radius": 0.05}}, "mass": 0.2, "position": [0.3, 0],
+             "velocity": [1, 0], "friction": 0.1, "support": {"friction": 0.2}}])") +
+            joined + R"(, "simulation": {"dt": 0.01, "duration": 1, "stepping": "event"}})");
+        const bool is_tied = joined[0] != '\0';
+        if (!is_tied) scene.bodies[1].position[0] = 0.1;
+        scene.bodies[1].support->friction += more;
+        scene.bodies[0].velocity[0] += faster;
+        const GradientResult result =
+            Jacobian(scene, {"bodies/b/support/friction"}, GradientMethod::kTangent);
+        ASSERT_TRUE(result.done) << joined << more << " " << faster << ": " << result.message;
+        EXPECT_EQ(result.values[3], 0.0);
+        EXPECT_EQ(result.values[9], 0.0);
+        const double speed = 1.0 + 0.5 * faster;
+        if (is_tied) {
+          EXPECT_NEAR(result.values[0], speed * speed / (2.0 * (0.2 + 0.5 * more) * kStandardG),
+                      1e-7 + 2.0 * std::abs(faster));
+        }
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace tangible
