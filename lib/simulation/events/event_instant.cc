@@ -168,8 +168,8 @@ bool EventStepper::ProjectOntoJoints(const Model<double>& model, double now, Sta
   return true;
 }
 
-// Friction in a joint holds what does not turn; whether a joint turns is told by twists that the
-// joints allow.
+// Friction in a joint holds what does not turn, and a support what stands on it; whether a joint
+// turns or a body stands is told by twists that the joints allow.
 bool EventStepper::TurnJoints(const Model<double>& model, double now, State<double>* state,
                               StepReport* outcome) {
   FindTouching(model, *state);
@@ -181,7 +181,19 @@ bool EventStepper::TurnJoints(const Model<double>& model, double now, State<doub
   const auto any = [&](const auto& is_one) {
     return std::any_of(touching_.contacts.begin(), touching_.contacts.end(), is_one);
   };
-  if (!any([&](const ActiveContact& contact) { return rests(given, contact); })) return true;
+  const auto stands = [&](const State<double>& at, const SupportIndex& support) {
+    const double* const twist = &at.twist[3 * static_cast<size_t>(support.body)];
+    return std::max({std::abs(twist[0]), std::abs(twist[1]), std::abs(twist[2])}) <= slow;
+  };
+  const auto any_support = [&](const auto& is_one) {
+    const std::vector<SupportIndex>& supports = model.structure->supports;
+    return !model.structure->joints.empty() &&
+           std::any_of(supports.begin(), supports.end(), is_one);
+  };
+  if (!any([&](const ActiveContact& contact) { return rests(given, contact); }) &&
+      !any_support([&](const SupportIndex& support) { return stands(given, support); })) {
+    return true;
+  }
   const int parts = record_.num_parts;
   if (!ProjectOntoJoints(model, now, state)) {
     outcome->message = "twists of joints as the run starts";
@@ -190,7 +202,10 @@ bool EventStepper::TurnJoints(const Model<double>& model, double now, State<doub
   const bool turn = any([&](const ActiveContact& contact) {
     return rests(given, contact) && !rests(*state, contact);
   });
-  if (turn) {
+  const bool starts = any_support([&](const SupportIndex& support) {
+    return stands(given, support) && !stands(*state, support);
+  });
+  if (turn || starts) {
     FindTouching(model, *state);
   } else {
     record_.num_parts = parts;

@@ -749,6 +749,7 @@ StepReport EventStepper::Advance(const Model<double>& model, double t, double h,
     outcome.stopped = at_event == AtEvent::kStopAtSecond && guess_.located > 1;
     if (outcome.stopped) break;
     *state = segment.after;
+    TakeHeldSpeeds(*model.structure, segment.before.supports, &state->twist);
     state->servo_modes.clear();
     state->supports.clear();
     supports_.Moved();

@@ -58,6 +58,10 @@ struct EventGuess {
 };
 
 /// Sets a guess of all contacts open, without impulses.
+/// Twists of what supports hold as a whole are 0, and no rounding.
+void TakeHeldSpeeds(const ModelStructure& structure, const std::vector<SupportState>& supports,
+                    std::vector<double>* twist);
+
 void SizeGuess(const ContactProblem<double>& problem, ContactSolution<double>* guess);
 /// Adds a solve to the report of a step.
 void CountSolve(const ContactSolverReport& solved, StepReport* outcome);
@@ -175,6 +179,7 @@ class EventStepper {
                           StepReport* outcome, Segment* segment);
   /// Takes the rest of its speed from what the supports of a motion hold, as a part of the record
   /// in the place of that motion.
+  bool LimitJointFriction(Segment* segment) const;
   bool StopSupports(const Model<double>& model, const Segment& segment, int parts,
                     State<double>* state, StepReport* outcome);
   /// Shortens a motion to what the contacts of ellipses allow (ellipse_motion.h): to the next

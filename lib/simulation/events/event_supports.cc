@@ -34,10 +34,10 @@ bool EventStepper::ChooseModes(const Model<double>& model, const State<double>& 
   listed_friction_ = segment->friction;
   supports_.Begin(model, slow, segment);
   // Bodies that come to rest on their supports leave a joint between them the rounding of their
-  // speeds.
+  // speeds; a motor's friction is about a speed that they do not have.
   for (size_t i = 0; i < slip.size(); ++i) {
     const ActiveContact& contact = listed_contacts_[i];
-    if (supports_.IsAtRest(model, segment->before, contact.a) &&
+    if (!contact.is_motor && supports_.IsAtRest(model, segment->before, contact.a) &&
         supports_.IsAtRest(model, segment->before, contact.b)) {
       slip[i] = 0.0;
     }
@@ -51,8 +51,19 @@ bool EventStepper::ChooseModes(const Model<double>& model, const State<double>& 
       segment->modes.clear();
       continue;
     }
-    const bool solved = flow_.Accelerate(model, *segment, segment->before, segment->time, &start_);
-    if (solved && supports_.Accept(model, start_.problem, start_.solution, segment)) break;
+    bool solved = flow_.Accelerate(model, *segment, segment->before, segment->time, &start_);
+    const std::vector<ContactMode> modes = segment->modes;
+    const bool limited = solved && LimitJointFriction(segment);
+    if (limited) {
+      solved = flow_.Accelerate(model, *segment, segment->before, segment->time, &start_);
+    }
+    const bool accepted =
+        solved && supports_.Accept(model, start_.problem, start_.solution, segment);
+    if (limited) segment->modes = modes;
+    if (accepted && limited) {
+      solved = flow_.Accelerate(model, *segment, segment->before, segment->time, &start_);
+    }
+    if (accepted && solved) break;
     const bool goes_on = solved && supports_.GoOnInstead(model, &segment->before);
     if (!solved || (supports_.has_given_up() && !goes_on)) {
       outcome->message = "accelerations";
@@ -72,6 +83,35 @@ bool EventStepper::ChooseModes(const Model<double>& model, const State<double>& 
   }
   supports_.Shorten(model, start_.solution.motion, segment);
   return true;
+}
+
+// Where a joint's friction and a support hold a body together, any share of the one does, also one
+// beyond its limit. The support is judged by what it has to hold where the joint is at its limit.
+bool EventStepper::LimitJointFriction(Segment* segment) const {
+  bool any = false;
+  for (size_t i = 0; i < segment->contacts.size(); ++i) {
+    const double tangent = start_.solution.tangent_impulse[i];
+    const double limit = start_.problem.contacts[i].friction * start_.solution.normal_impulse[i];
+    if (!segment->contacts[i].IsJointFriction() || segment->modes[i] != ContactMode::kSticking ||
+        std::abs(tangent) <= (1.0 + kForceTolerance) * limit) {
+      continue;
+    }
+    segment->modes[i] =
+        tangent > 0.0 ? ContactMode::kSlidingNegative : ContactMode::kSlidingPositive;
+    any = true;
+  }
+  return any;
+}
+
+void TakeHeldSpeeds(const ModelStructure& structure, const std::vector<SupportState>& supports,
+                    std::vector<double>* twist) {
+  for (size_t k = 0; k < supports.size(); ++k) {
+    const bool centre = structure.supports[k].kind == SupportIndex::kCentre;
+    const int held_rows = supports[k].holds == SupportState::kBody ? 3
+                          : supports[k].holds >= 0 && centre       ? 2
+                                                                   : 0;
+    std::fill_n(twist->begin() + 3 * structure.supports[k].body, held_rows, 0.0);
+  }
 }
 
 // What a support holds has no speed, not even the rounding that an event leaves.
@@ -98,16 +138,13 @@ bool EventStepper::StopSupports(const Model<double>& model, const Segment& segme
   }
   const std::vector<double> before = state->twist;
   SpreadTwists(s, stop.solution.motion, &state->twist);
+  TakeHeldSpeeds(s, supports, &state->twist);
   for (size_t k = 0; k < s.supports.size(); ++k) {
-    const bool centre = s.supports[k].kind == SupportIndex::kCentre;
-    const int held_rows = supports[k].holds == SupportState::kBody ? 3
-                          : supports[k].holds >= 0 && centre       ? 2
-                                                                   : 0;
-    const auto twist = state->twist.begin() + 3 * s.supports[k].body;
-    std::fill_n(twist, held_rows, 0.0);
     // A joint may keep a body from turning about its held centre.
-    const double turned = before[static_cast<size_t>(3 * s.supports[k].body + 2)];
-    if (held_rows == 2 && std::abs(twist[2]) <= kStoppedTurn * std::abs(turned)) twist[2] = 0.0;
+    const size_t turn = 3 * static_cast<size_t>(s.supports[k].body) + 2;
+    const bool stops = supports[k].holds >= 0 && s.supports[k].kind == SupportIndex::kCentre &&
+                       std::abs(state->twist[turn]) <= kStoppedTurn * std::abs(before[turn]);
+    if (stops) state->twist[turn] = 0.0;
   }
   stop.new_twist = state->twist;
   supports_.Stopped();

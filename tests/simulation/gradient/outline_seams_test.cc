@@ -118,5 +118,80 @@ TEST(OutlineSeamsTest, WhatPassesFlushPiecesMovesAsOnOnePlane) {
   }
 }
 
+TEST(OutlineSeamsTest, WhateverTheTilt) {
+  for (const Stepping stepping : {Stepping::kEvent, Stepping::kFixed}) {
+    for (const double tilt : {0.3, -1.1}) {
+      const Pass pass{kShapes[0], 1.0, 0.1, tilt, 0.1, stepping};
+      const GradientResult plane = Derivative(SceneOf(pass, nullptr, nullptr));
+      for (const Piece& left : kLeft) {
+        for (const Piece& right : kRight) {
+          const GradientResult seam = Derivative(SceneOf(pass, &left, &right));
+          const std::string what =
+              std::string(left.name) + " " + right.name + ", tilt " + std::to_string(tilt);
+          ASSERT_TRUE(seam.done) << what << ": " << seam.message;
+          EXPECT_NEAR((seam.values - plane.values).cwiseAbs().maxCoeff(), 0.0, 1e-9) << what;
+          EXPECT_NEAR((seam.jacobian - plane.jacobian).cwiseAbs().maxCoeff(), 0.0, 1e-8) << what;
+        }
+      }
+    }
+  }
+}
+
+// A body that lies over the seam and into it is pushed out as from one plane.
+TEST(OutlineSeamsTest, WhatLiesInFlushPiecesIsPushedOutAsFromOnePlane) {
+  for (const char* shape : {kShapes[0], kShapes[1]}) {
+    for (const Stepping stepping : {Stepping::kEvent, Stepping::kFixed}) {
+      const auto pushed = [&](const Piece* left, const Piece* right) {
+        Scene scene = SceneOf({shape, 1.0, 0.1, 0.0, 0.01, stepping}, left, right);
+        for (BasicBody<double>& body : scene.bodies) {
+          if (body.name == "b") body.position = {0.03, 1.1 - 2e-4};
+        }
+        return Derivative(scene);
+      };
+      const GradientResult plane = pushed(nullptr, nullptr);
+      for (const Piece& left : kLeft) {
+        for (const Piece& right : kRight) {
+          const GradientResult seam = pushed(&left, &right);
+          const std::string what = std::string(left.name) + " " + right.name + " " + shape;
+          ASSERT_TRUE(seam.done) << what << ": " << seam.message;
+          EXPECT_NEAR((seam.values - plane.values).cwiseAbs().maxCoeff(), 0.0, 1e-9) << what;
+        }
+      }
+    }
+  }
+}
+
+// The right piece is higher or lower: up to 1e-8 m it is flush, higher it is a wall, and lower a
+// fall.
+TEST(OutlineSeamsTest, StepsUpAreWallsAndStepsDownAreFalls) {
+  for (const char* shape : {kShapes[0], kShapes[1]}) {
+    for (const Stepping stepping : {Stepping::kEvent, Stepping::kFixed}) {
+      const Pass pass{shape, 1.0, 0.0, 0.0, 0.01, stepping};
+      const GradientResult plane = Derivative(SceneOf(pass, nullptr, nullptr));
+      for (const Piece& left : kLeft) {
+        for (const Piece& right : kRight) {
+          const std::string what = std::string(left.name) + " " + right.name + " " + shape +
+                                   (stepping == Stepping::kEvent ? ", events" : ", fixed");
+          const auto values = [&](double higher) {
+            const GradientResult result = Derivative(SceneOf(pass, &left, &right, higher));
+            EXPECT_TRUE(result.done) << what << ": " << result.message;
+            return result.values;
+          };
+          EXPECT_NEAR((values(0.9e-8) - plane.values).cwiseAbs().maxCoeff(), 0.0, 1e-7) << what;
+          EXPECT_NEAR((values(-1e-9) - plane.values).cwiseAbs().maxCoeff(), 0.0, 1e-7) << what;
+          // Behind the end of an open line nothing hides that of the lower piece, which fixed steps
+          // meet ahead of time.
+          if (left.name != std::string("open") || stepping == Stepping::kEvent) {
+            EXPECT_NEAR(values(-1e-3)[3], 1.3, 0.05) << what;
+          }
+          const Eigen::VectorXd wall = values(shape == kShapes[0] ? 1e-3 : 0.05);
+          EXPECT_LT(wall[3], 0.0) << what;
+          EXPECT_LT(wall[0], -0.08) << what;
+        }
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace tangible

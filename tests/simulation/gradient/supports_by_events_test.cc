@@ -524,5 +524,70 @@ TEST(SupportsByEventsTest, PucksThatStopNearlyTogether) {
   }
 }
 
+// A spring pulls it back from where it stops, against the friction of joint and table, which could
+// each hold it at any force if their shares were free. Against fixed steps of 0.1 ms.
+TEST(SupportsByEventsTest, AnArmThatASpringPullsBack) {
+  for (const double rate : {0.8, -0.8}) {
+    Scene scene = SceneOf(R"({"gravity": [0, 0], "bodies": [
+        {"name": "b", "mass": 0.2, "inertia": 0.1, "position": [0.3, 0], "support": {"friction": 0.1}}],
+        "joints": [{"name": "j", "type": "revolute", "bodies": ["b", "world"], "anchor": [0, 0],
+                    "rate": 0.8, "stiffness": 1, "friction": 0.02}],
+        "simulation": {"dt": 0.02, "duration": 1, "stepping": "event"}})");
+    scene.joints[0].rate = rate;
+    const GradientResult result = Jacobian(scene, {"joints/j/rate"}, GradientMethod::kTangent);
+    ASSERT_TRUE(result.done) << result.message;
+    scene.simulation.stepping = Stepping::kFixed;
+    scene.simulation.dt = 1e-4;
+    const GradientResult fixed = Jacobian(scene, {"joints/j/rate"}, GradientMethod::kTangent);
+    ASSERT_TRUE(fixed.done) << fixed.message;
+    EXPECT_NEAR(result.values[2], fixed.values[2], 1e-4);
+    EXPECT_NEAR(result.values[5], fixed.values[5], 2e-4);
+    EXPECT_LT(result.values[5] * rate, -0.1);
+  }
+}
+
+// A body without a speed of its own follows the other one to which it is joined, from the start on.
+TEST(SupportsByEventsTest, AJointTakesABodyAlongFromTheStart) {
+  for (const char* type : {"weld", "revolute"}) {
+    const Scene scene = SceneOf(std::string(R"({"gravity": [0, 0], "bodies": [
+        {"name": "a", "mass": 0.2, "inertia": 0.02, "position": [0.3, 0], "velocity": [0.5, -1],
+         "support": {"friction": 0.1}},
+        {"name": "b", "mass": 2, "inertia": 0.1, "position": [0.9, 0], "support": {"friction": 0.3}}],
+        "joints": [{"name": "j", "type": ")") +
+                                type + R"(", "bodies": ["b", "a"], "anchor": [0.6, 0]}],
+        "simulation": {"dt": 0.01, "duration": 1, "stepping": "event"}})");
+    const GradientResult result =
+        Jacobian(scene, {"bodies/a/velocity/x", "bodies/a/velocity/y"}, GradientMethod::kTangent);
+    ASSERT_TRUE(result.done) << result.message;
+    EXPECT_GT(result.values[6], 0.9 + 1e-4);
+    Scene other = scene;
+    other.simulation.stepping = Stepping::kFixed;
+    other.simulation.dt = 1e-4;
+    const GradientResult fixed = Jacobian(other, {"bodies/a/velocity/x"}, GradientMethod::kTangent);
+    ASSERT_TRUE(fixed.done) << fixed.message;
+    for (const int i : {0, 1, 2, 6, 7, 8}) EXPECT_NEAR(result.values[i], fixed.values[i], 5e-4);
+    const GradientResult differences = Jacobian(
+        scene, {"bodies/a/velocity/x", "bodies/a/velocity/y"}, GradientMethod::kFiniteDifference);
+    EXPECT_LT((differences.jacobian - result.jacobian).norm(), 1e-6 * result.jacobian.norm());
+  }
+}
+
+// A motor that is too weak to turn an arm on the table stands, with all that it has.
+TEST(SupportsByEventsTest, AWeakMotorStands) {
+  const Scene scene = SceneOf(R"({"gravity": [0, 0], "bodies": [
+      {"name": "b", "mass": 1, "inertia": 0.01, "position": [0.3, 0],
+       "support": {"friction": 0.2, "radius": 0.1}}],
+      "joints": [{"name": "j", "type": "revolute", "bodies": ["b", "world"], "anchor": [0, 0],
+                  "rate": 0.5, "motor": {"speed": 1, "limit": 0.1}}],
+      "simulation": {"dt": 0.01, "duration": 1, "stepping": "event"}})");
+  const std::vector<std::string> paths = {"joints/j/rate", "joints/j/motor/limit"};
+  const GradientResult result = Jacobian(scene, paths, GradientMethod::kTangent);
+  ASSERT_TRUE(result.done) << result.message;
+  EXPECT_GT(result.values[2], 0.0);
+  for (const int i : {3, 4, 5}) EXPECT_EQ(result.values[i], 0.0);
+  EXPECT_EQ(result.certificate.verdict, "trustworthy");
+  ExpectOthersAgree(scene, paths, result);
+}
+
 }  // namespace
 }  // namespace tangible
