@@ -170,6 +170,8 @@ TEST(OutlineSeamsTest, StepsUpAreWallsAndStepsDownAreFalls) {
       const GradientResult plane = Derivative(SceneOf(pass, nullptr, nullptr));
       for (const Piece& left : kLeft) {
         for (const Piece& right : kRight) {
+          const bool alike = left.name == std::string(right.name);
+          if (!alike && right.name != std::string("open")) continue;
           const std::string what = std::string(left.name) + " " + right.name + " " + shape +
                                    (stepping == Stepping::kEvent ? ", events" : ", fixed");
           const auto values = [&](double higher) {
