@@ -7,8 +7,8 @@
 //   −ln L(p) = least cost(p) + D(p)
 //
 // and no longer that of parameters and forces together. D depends on second derivatives of the
-// motion; its slope is that of central differences, a tenth of a parameter's deviation at the others
-// held to both sides, at each of which the forces are found anew. Fits and slopes alternate
+// motion; its slope is that of central differences, a tenth of a parameter's deviation at the
+// others held to both sides, at each of which the forces are found anew. Fits and slopes alternate
 // (variance_components.h): as D is nearly linear over a deviation, three or four fits suffice. The
 // curvature of D is left out of the intervals.
 //

@@ -3,8 +3,8 @@
 //
 // A fit that also estimates variances: the standard deviation of sensors' noise (sensor_noise.h),
 // the spread of parameters that vary from recording to recording (random_effects.h) and the
-// intensity of random forces (noise_intensity.h), which are integrated out (noise_slope.h). Each has
-// an equation at the estimate of a fit with given values; fits and equations alternate until no
+// intensity of random forces (noise_intensity.h), which are integrated out (noise_slope.h). Each
+// has an equation at the estimate of a fit with given values; fits and equations alternate until no
 // value changes any more.
 
 #include <functional>
