@@ -74,7 +74,6 @@ bool UpdateSlopes(const FitOptions& options, const FitResult& result, Recordings
                   double* largest, std::vector<std::string>* rough, std::string* message) {
   const std::vector<ParameterEntry>& entries = problem->entries();
   std::vector<BlockSlope> slopes(static_cast<size_t>(problem->num_blocks()));
-  const BlockLayout layout(*problem);
   ForEachOnThreads(options.threads, problem->num_blocks(), [&](int b) {
     RolloutResiduals* const run = problem->run(b);
     Eigen::VectorXd p(run->num_parameters());

@@ -96,6 +96,19 @@ bool AreAll(const HeldOutRun& run) {
   return factor.rank() == FreedomOf(structure);
 }
 
+/// Whether another pose at the start would be another machine: anchors are points of the world at
+/// the start, which coordinates of joints take along and poses of bodies do not.
+bool MovesAnchors(const FitProblem& problem, const HeldOutRun& run) {
+  if (!problem.scene.springs.empty()) return true;
+  return !problem.scene.joints.empty() &&
+         std::any_of(run.fitted.begin(), run.fitted.end(), [&](int k) {
+           const std::vector<ParameterSet>& sets = problem.parameters[static_cast<size_t>(k)].sets;
+           return std::any_of(sets.begin(), sets.end(), [](const ParameterSet& set) {
+             return set.path.rfind("bodies/", 0) == 0;
+           });
+         });
+}
+
 bool DoesNotFit(const HeldOutRun& run) {
   if (run.residuals.size() == 0) return true;
   BlockEvaluation evaluation;
@@ -161,7 +174,7 @@ bool MayBeginLate(const HeldOutRecording& recording, const HeldOutRun& run) {
                       std::any_of(recording.later.begin(), recording.later.end(), counts);
   return one.process_noise.empty() && one.instruments.clocks.empty() && !events &&
          !run.fitted.empty() && run.first_part && run.parameters.size() > 0 &&
-         IsConstant(one.scene) && AreAll(run);
+         IsConstant(one.scene) && !MovesAnchors(one, run) && AreAll(run);
 }
 
 StateWindow ChooseStateWindow(const FitInput& input, const RecordingsProblem& problem,

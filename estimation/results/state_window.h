@@ -12,7 +12,8 @@
 // than all observations by more than the standard error of the difference.
 //
 // The run of a window begins at its first observation. That is possible where nothing of the scene
-// depends on time, and where the parameters of the start make every motion that joints allow.
+// depends on time, where the parameters of the start make every motion that joints allow, and where
+// they do not move anchors: without springs, and beside joints by coordinates of these alone.
 
 #include <Eigen/Core>
 #include <vector>

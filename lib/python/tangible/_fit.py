@@ -229,7 +229,8 @@ class FitResult:
             estimate, as `predictions` is.
         predictions: A column each of the table of all observations beside their predictions: `time`
             (s), `target`, `coordinate`, `used` ("fit", "prediction", or of recordings with the
-            role `predict` "state" and "unused"), `sigma`, `observed`, `predicted`, `residual` (predicted - observed), `residual_in_sigma`, and more.
+            role `predict` "state" and "unused"), `sigma`, `observed`, `predicted`, `residual`
+            (predicted - observed), `residual_in_sigma`, and more.
             `pandas.DataFrame(result.predictions)` is a table.
         draws: Draws from the posterior, if `posterior` asked for them: arrays of `draw`, `chain`,
             `cost` and of each parameter by its name; else empty.

@@ -57,11 +57,10 @@ struct EventGuess {
   size_t bytes() const;
 };
 
-/// Sets a guess of all contacts open, without impulses.
-/// Twists of what supports hold as a whole are 0, and no rounding.
+/// Sets the twists of what supports hold as a whole to 0: motions and projections leave rounding.
 void TakeHeldSpeeds(const ModelStructure& structure, const std::vector<SupportState>& supports,
                     std::vector<double>* twist);
-
+/// Sets a guess of all contacts open, without impulses.
 void SizeGuess(const ContactProblem<double>& problem, ContactSolution<double>* guess);
 /// Adds a solve to the report of a step.
 void CountSolve(const ContactSolverReport& solved, StepReport* outcome);
