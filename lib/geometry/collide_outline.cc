@@ -78,7 +78,7 @@ class OutlinePair {
     for (int i = 0; i < other_.Size(); ++i) {
       const Vector2<double> x = PointAt(i);
       const double height = HeightOf(x);
-      if (height < lowest && outline_.IsOver(run_, x) && IsFree(i, -of_.normal)) {
+      if (height < lowest && outline_.IsOver(run_, x) && IsFree(i, -of_.normal) && FacesRun(i)) {
         lowest = height;
         at = i;
       }
@@ -94,6 +94,21 @@ class OutlinePair {
       }
     }
     if (second >= 0) AddOnRun(second, HeightOf(other_.VertexAt(second)));
+  }
+
+  /// Whether a vertex of B is the lowest one, or belongs to a face that is nearly parallel to the
+  /// run. The end of a face that slides on past a corner is over the other edge of that corner too,
+  /// up to rounding, and would be stopped by it.
+  bool FacesRun(int vertex) const {
+    if (is_ellipse_ || other_.Size() < 2) return true;
+    const double height = HeightOf(other_.VertexAt(vertex));
+    const int edges[2] = {vertex, other_.Previous(vertex)};
+    return (HeightOf(other_.VertexAt(other_.Next(vertex))) >= height &&
+            HeightOf(other_.VertexAt(other_.Previous(vertex))) >= height) ||
+           std::any_of(edges, edges + 2, [&](int edge) {
+             const CoreEdge line = other_.Edge(edge);
+             return line.length > 0.0 && -line.Normal().dot(of_.normal) > kFacing;
+           });
   }
 
   void AddOnRun(int vertex, double height) {
@@ -193,10 +208,10 @@ class OutlinePair {
     };
     return s >= -room(edge) && s <= line.length + room(other_.Next(edge)) && IsFreeAt(edge, s);
   }
-  /// Whether a vertex of B's face above the corner is a contact already. A face of a polygon's
-  /// other body may face the edge that ends at the corner, and then has none on this one.
+  /// Whether a vertex of B's face above the corner is a contact already. A face that faces the edge
+  /// that ends at the corner has none on this one.
   bool IsTaken(double foot, const CoreEdge& line) const {
-    if (outline_.IsPolygon() && -line.Normal().dot(of_.normal) <= kFacing) return false;
+    if (-line.Normal().dot(of_.normal) <= kFacing) return false;
     return std::any_of(foot_, foot_ + num_on_run_, [&](double s) {
       return std::abs(s - foot) <= kLengthRounding * (of_.length + line.length);
     });
@@ -204,8 +219,8 @@ class OutlinePair {
 
   /// Whether a vertex of B's face above the corner is a contact of the run that ends there.
   bool IsTakenBefore(const Vector2<double>& v, int edge) const {
-    if (!outline_.IsPolygon()) return false;
-    const int previous = outline_.Previous(run_);
+    const int previous = of_.before == OutlineJoint::kConvex ? outline_.Previous(run_) : -1;
+    if (previous < 0) return false;
     const OutlineRun& before = outline_.run(previous);
     const CoreEdge line = other_.Edge(edge);
     const double room = kLengthRounding * (before.length + line.length);

@@ -78,7 +78,11 @@ Outline::Outline(const ShapeView<double>& shape) {
 void Outline::SetJoints() {
   for (int i = 0; i < num_runs(); ++i) {
     const int next = Next(i);
-    if (next < 0) continue;
+    if (next < 0) {
+      // As if a wall went straight down from each end.
+      runs_[i].bisector_after = runs_[0].bisector_before = 1.0;
+      continue;
+    }
     OutlineRun& before = runs_[i];
     OutlineRun& after = runs_[next];
     const double sine = Cross(before.tangent, after.tangent);

@@ -15,7 +15,9 @@
 // A run is a maximal sequence of edges with flush joints. It is one face, and the part of its
 // body that contacts belong to. A point x has the foot s = t·(x − start) and the height n·(x −
 // start) over a run. It is over the run where its foot is. Behind the run it is so at a convex
-// joint only up to the bisector, so that it is over the nearest one of the two runs. Beyond a
+// joint only up to the bisector, so that it is over the nearest one of the two runs, and at the end
+// of an open line as if a wall went straight down there: a face that meets the end is not in the
+// solid with what of it lies below. Beyond a
 // concave joint it is also where it is behind the neighbour, because near the joint both bound
 // the free side. A point behind a run that is over another run with a smaller height above it
 // is on the free side of a thin solid, and no contact of the first one.
@@ -40,7 +42,7 @@ struct OutlineRun {
   Vector2<double> start{0.0, 0.0}, tangent{0.0, 0.0}, normal{0.0, 0.0};
   double length = 0.0;
   OutlineJoint before = OutlineJoint::kEnd, after = OutlineJoint::kEnd;
-  double bisector_before = 0.0, bisector_after = 0.0;  ///< tan(turn / 2) of convex joints
+  double bisector_before = 0.0, bisector_after = 0.0;  ///< tan(turn / 2); of ends 1
 };
 
 /// Whether a shape is a polygon with a corner that turns inward, by more than kFlushTurn.

@@ -132,7 +132,7 @@ class NeighbouringOutline {
     });
     NormalsAt normals;
     if (near.empty()) {
-      normals.is_inside = Contains(x);
+      if (!AddEndFace(x, within, &normals)) normals.is_inside = Contains(x);
       return normals;
     }
     // A solid that is thinner than the tolerance hides nothing.
@@ -180,7 +180,7 @@ class NeighbouringOutline {
     for (const int i : {0, outline_.num_runs() - 1}) {
       const OutlineRun& run = outline_.run(i);
       const double turn = run.tangent.dot(along);
-      if (outline_.Next(outline_.num_runs() - 1) >= 0 || std::abs(turn) <= kFlushTurn) continue;
+      if (!IsOpen() || std::abs(turn) <= kFlushTurn) continue;
       add(-run.tangent.dot(from - run.start) / turn);
       add((run.length - run.tangent.dot(from - run.start)) / turn);
     }
@@ -198,11 +198,39 @@ class NeighbouringOutline {
     return {std::min(x.x(), y.x()) - within, std::min(x.y(), y.y()) - within,
             std::max(x.x(), y.x()) + within, std::max(x.y(), y.y()) + within};
   }
+  bool IsOpen() const { return outline_.Next(outline_.num_runs() - 1) < 0; }
   bool Contains(const Vector2<double>& x) const {
     if (outline_.IsPolygon()) return outline_.Contains(x);
     for (int i = 0; i < outline_.num_runs(); ++i) {
       const OutlineRun& run = outline_.run(i);
       if (run.normal.dot(x - run.start) < 0.0 && outline_.IsOver(i, x)) return true;
+    }
+    return IsOpen() && (IsBehindEnd(false, x) || IsBehindEnd(true, x));
+  }
+  // Near the end of an open line IsOver takes what is below it for what lies beside the end. What
+  // is solid below the line, farther from its end, is solid up to where it ends.
+  bool IsBehindEnd(bool at_end, const Vector2<double>& x) const {
+    const int i = at_end ? outline_.num_runs() - 1 : 0;
+    const OutlineRun& run = outline_.run(i);
+    const Vector2<double> inwards = at_end ? Vector2<double>(-run.tangent) : run.tangent;
+    const double depth = -run.normal.dot(x - run.start);
+    const double s = run.tangent.dot(x - run.start);
+    return depth > 0.0 && s >= 0.0 && s <= run.length && outline_.IsOver(i, x + depth * inwards);
+  }
+  // The face that goes down from where an open line ends, at a point of it.
+  bool AddEndFace(const Vector2<double>& x, double within, NormalsAt* normals) const {
+    for (const bool at_end : {false, true}) {
+      const OutlineRun& run = outline_.run(at_end ? outline_.num_runs() - 1 : 0);
+      const Vector2<double> outwards = at_end ? run.tangent : Vector2<double>(-run.tangent);
+      const Vector2<double> end = at_end ? run.start + run.length * run.tangent : run.start;
+      const double beyond = outwards.dot(x - end);
+      if (!IsOpen() || std::abs(beyond) > within) continue;
+      if (!Contains(x - (beyond + within) * outwards)) continue;
+      const Vector2<double> normal = pose_.rotation * outwards;
+      normals->faces.push_back({normal, normal.dot(pose_ * end)});
+      normals->is_inside = normals->any = true;
+      normals->first = normals->last = normal;
+      return true;
     }
     return false;
   }

@@ -58,13 +58,16 @@ TEST(OutlineTest, EdgesThatDoNotTurnAreOneRun) {
 }
 
 TEST(OutlineTest, ADiscTouchesTheEdgeUnderItsCentreOnBothSides) {
-  for (const double y : {0.3, 0.05, -0.7}) {
+  for (const double y : {0.3, 0.05, -0.4}) {
     const RunContacts found = DiscOver(kFloorPoints, 0, -1.5, y);
     ASSERT_EQ(found.count, 1);
     EXPECT_EQ(found.features[0], (ContactFeature{FeatureKind::kVertexEdge, 0, 2}));
     EXPECT_NEAR(found.contacts[0].gap, y - 0.1, 1e-15);
     EXPECT_EQ(found.contacts[0].normal.y(), 1.0);
   }
+  // Nearer to the end than to the line it is beside the end, and below it on no free side.
+  EXPECT_EQ(DiscOver(kFloorPoints, 0, -1.5, -0.7).count, 0);
+  EXPECT_EQ(DiscOver(kFloorPoints, 0, 0.0, -0.7).count, 1);
 }
 
 TEST(OutlineTest, AnEndIsACornerOnTheFreeSideAlone) {

@@ -35,17 +35,27 @@ bool TouchTheSame(const ModelStructure& structure, int a, int b) {
   });
 }
 
-// The pairs of bodies that touch and keep their places relative to each other.
+// The box in which a shape may be a neighbour: behind a line that is open everything is solid, of
+// which the next of its own length counts.
+Aabb BoxOfNeighbour(const ShapeView<double>& shape, const Pose<double>& pose, bool is_open_line) {
+  const double rounding = kSeamRounding * pose.position.cwiseAbs().maxCoeff();
+  const Aabb box = ComputeAabb(shape, pose, kFlushStep + rounding);
+  if (!is_open_line) return box;
+  const double length = std::max(box.max_x - box.min_x, box.max_y - box.min_y);
+  return {box.min_x - length, box.min_y - length, box.max_x + length, box.max_y + length};
+}
+
+// The pairs of bodies that touch, or may lie behind an open line, and keep their places relative to
+// each other.
 std::vector<std::pair<int, int>> FindNeighbours(const Model<double>& model,
                                                 const State<double>& state,
-                                                const std::vector<bool>& may_have_seams) {
+                                                const std::vector<bool>& may_have_seams,
+                                                const std::vector<bool>& are_open_lines) {
   const ModelStructure& structure = *model.structure;
   std::vector<Aabb> boxes(structure.bodies.size(), {kInfinity, kInfinity, -kInfinity, -kInfinity});
   for (int body = 0; body < structure.num_bodies(); ++body) {
     if (may_have_seams[body]) {
-      const Pose<double> pose = state.PoseOf(body);
-      const double rounding = kSeamRounding * pose.position.cwiseAbs().maxCoeff();
-      boxes[body] = ComputeAabb(model.Shape(body), pose, kFlushStep + rounding);
+      boxes[body] = BoxOfNeighbour(model.Shape(body), state.PoseOf(body), are_open_lines[body]);
     }
   }
   std::vector<std::pair<int, int>> pairs;
@@ -69,6 +79,7 @@ void FindModelSeams(const State<double>& state, Model<double>* model) {
   model->curve_of.clear();
   const ModelStructure& structure = *model->structure;
   std::vector<bool> may_have_seams(structure.bodies.size(), false);
+  std::vector<bool> are_open_lines(structure.bodies.size(), false);
   int count = 0;
   ModelSeams seams;
   std::vector<int> seams_of(structure.bodies.size(), -1);
@@ -84,7 +95,8 @@ void FindModelSeams(const State<double>& state, Model<double>* model) {
     }
     if (HasOutline(*model, body)) {
       outline_of[body] = static_cast<int>(seams.outlines.size());
-      seams.outlines.emplace_back(model->Shape(body));
+      const Outline& outline = seams.outlines.emplace_back(model->Shape(body));
+      are_open_lines[body] = outline.Next(outline.num_runs() - 1) < 0;
     }
     if (index.block < 0 && MayHaveSeams(model->Shape(body))) {
       may_have_seams[body] = true;
@@ -99,7 +111,7 @@ void FindModelSeams(const State<double>& state, Model<double>* model) {
     return {model->Shape(body), state.PoseOf(body),
             outline_of[body] < 0 ? nullptr : &seams.outlines[outline_of[body]]};
   };
-  for (const auto& [a, b] : FindNeighbours(*model, state, may_have_seams)) {
+  for (const auto& [a, b] : FindNeighbours(*model, state, may_have_seams, are_open_lines)) {
     neighbours[a].push_back(placed(b));
     neighbours[b].push_back(placed(a));
   }

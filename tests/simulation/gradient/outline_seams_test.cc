@@ -181,17 +181,112 @@ TEST(OutlineSeamsTest, StepsUpAreWallsAndStepsDownAreFalls) {
           };
           EXPECT_NEAR((values(0.9e-8) - plane.values).cwiseAbs().maxCoeff(), 0.0, 1e-7) << what;
           EXPECT_NEAR((values(-1e-9) - plane.values).cwiseAbs().maxCoeff(), 0.0, 1e-7) << what;
-          // Behind the end of an open line nothing hides that of the lower piece, which fixed steps
-          // meet ahead of time.
-          if (left.name != std::string("open") || stepping == Stepping::kEvent) {
-            EXPECT_NEAR(values(-1e-3)[3], 1.3, 0.05) << what;
-          }
+          // Below the end of an open line, too, that of the lower piece is hidden: fixed steps
+          // would meet it ahead of time.
+          EXPECT_NEAR(values(-1e-3)[3], 1.3, 0.05) << what;
           const Eigen::VectorXd wall = values(shape == kShapes[0] ? 1e-3 : 0.05);
           EXPECT_LT(wall[3], 0.0) << what;
           EXPECT_LT(wall[0], -0.08) << what;
         }
       }
     }
+  }
+}
+
+// A flat face on a corner of a line, whichever: it overhangs the left or the right edge of a table
+// and rests, slides across a gap and a slot as on one plane, and is stopped by the end of an open
+// line as by a step of that height.
+Scene OnLines(const std::string& lines, double x, double speed, double friction, Stepping stepping,
+              double duration) {
+  Scene scene = test_scenes::SceneOf(
+      R"({"bodies": [{"name": "b", "shape": {"box": {"size": [0.2, 0.2]}}, "mass": 1,
+          "position": [0, 0.1]}, )" +
+      lines + R"(], "simulation": {"dt": 0.01}})");
+  scene.simulation.stepping = stepping;
+  scene.simulation.duration = duration;
+  scene.bodies[0].position[0] = x;
+  scene.bodies[0].velocity[0] = speed;
+  for (BasicBody<double>& body : scene.bodies) body.friction = friction;
+  return scene;
+}
+
+std::string Line(const std::string& name, const std::string& points, const std::string& more) {
+  return R"({"name": ")" + name + R"(", "static": true, "shape": {"polyline": {"points": )" +
+         points + ", " + more + "}}}";
+}
+
+TEST(OutlineSeamsTest, AFaceThatOverhangsAnEdgeRests) {
+  const std::string closed = R"("closed": true, "solid": "left")";
+  for (const Stepping stepping : {Stepping::kEvent, Stepping::kFixed}) {
+    for (const std::string& line :
+         {Line("t", "[[0, -1], [1, -1], [1, 0], [0, 0]]", closed),
+          Line("t", "[[1, 0], [0, 0], [0, -1], [1, -1]]", closed),
+          Line("t", "[[1, 0], [0, 0], [0, -0.05]]", R"("solid": "left")")}) {
+      const GradientResult rests = Derivative(OnLines(line, 0.05, 0.0, 0.3, stepping, 0.1));
+      ASSERT_TRUE(rests.done) << rests.message;
+      EXPECT_NEAR(rests.values[0], 0.05, 1e-12);
+      EXPECT_NEAR(rests.values[1], 0.1, 1e-12);
+      EXPECT_NEAR(rests.values[2], 0.0, 1e-12);
+    }
+    const GradientResult right = Derivative(OnLines(
+        Line("t", "[[0, -1], [1, -1], [1, 0], [0, 0]]", closed), 0.95, 0.0, 0.3, stepping, 0.1));
+    ASSERT_TRUE(right.done) << right.message;
+    EXPECT_NEAR(right.values[2], 0.0, 1e-12);
+  }
+}
+
+// x = -0.5 + 2 t - mu g t^2 / 2.
+TEST(OutlineSeamsTest, AFaceSlidesAcrossGapsAndSlots) {
+  const std::string closed = R"("closed": true, "solid": "left")";
+  const std::string gap = Line("l", "[[-1, -1], [0, -1], [0, 0], [-1, 0]]", closed) + ", " +
+                          Line("r", "[[0.01, -1], [1, -1], [1, 0], [0.01, 0]]", closed);
+  const std::string slot_points =
+      "[[-1, -1], [1, -1], [1, 0], [0.01, 0], [0.01, -0.1], [0, -0.1], [0, 0], [-1, 0]]";
+  const std::string polygon =
+      R"({"name": "t", "static": true, "shape": {"polygon": {"vertices": )" + slot_points + "}}}";
+  for (const Stepping stepping : {Stepping::kEvent, Stepping::kFixed}) {
+    for (const std::string& lines : {gap, Line("t", slot_points, closed), polygon}) {
+      for (const double friction : {0.0, 0.3}) {
+        const GradientResult passes =
+            Derivative(OnLines(lines, -0.5, 2.0, friction, stepping, 0.5));
+        ASSERT_TRUE(passes.done) << lines << passes.message;
+        const double way = stepping == Stepping::kEvent ? 0.125 : 0.1275;
+        EXPECT_NEAR(passes.values[0], 0.5 - way * friction * 9.81, 1e-9) << lines;
+        EXPECT_NEAR(passes.values[2], 0.0, 1e-9) << lines;
+      }
+    }
+  }
+}
+
+TEST(OutlineSeamsTest, AnEndOfALineStopsAFaceAsAStepDoes) {
+  const std::string floor =
+      R"({"name": "f", "static": true, "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}, )";
+  for (const double height : {0.001, 0.05, 0.1}) {
+    const std::string at = std::to_string(height);
+    const std::string open = Line("s", "[[0, " + at + "], [1, " + at + "]]", R"("solid": "right")");
+    const std::string box = R"({"name": "s", "static": true, "position": [0.5, )" +
+                            std::to_string(0.5 * height) + R"(], "shape": {"box": {"size": [1, )" +
+                            at + "]}}}";
+    for (const Stepping stepping : {Stepping::kEvent, Stepping::kFixed}) {
+      const GradientResult line = Derivative(OnLines(floor + open, -0.5, 2.0, 0.3, stepping, 0.4));
+      const GradientResult step = Derivative(OnLines(floor + box, -0.5, 2.0, 0.3, stepping, 0.4));
+      ASSERT_TRUE(line.done) << at << line.message;
+      ASSERT_TRUE(step.done) << at << step.message;
+      for (int i = 0; i < 3; ++i) EXPECT_NEAR(line.values[i], step.values[i], 1e-3) << at << i;
+    }
+  }
+}
+
+// A ball that rolls in under a shelf, 1 m above the floor, is not lifted onto it.
+TEST(OutlineSeamsTest, WhatPassesBelowAShelfStaysBelow) {
+  const std::string floor =
+      R"({"name": "f", "static": true, "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}, )";
+  const std::string shelf = Line("s", "[[0, 1], [1, 1]]", R"("solid": "right")");
+  for (const Stepping stepping : {Stepping::kEvent, Stepping::kFixed}) {
+    const GradientResult below = Derivative(OnLines(floor + shelf, -0.5, 2.0, 0.0, stepping, 0.5));
+    ASSERT_TRUE(below.done) << below.message;
+    EXPECT_NEAR(below.values[0], 0.5, 1e-12);
+    EXPECT_NEAR(below.values[1], 0.1, 1e-9);
   }
 }
 
