@@ -117,6 +117,12 @@ TEST(StateWindowTest, ARunThatCannotBeginLaterHasItFromAll) {
               "\"forces\": [{\"name\": \"push\", \"body\": \"bob\", \"force\": [0.3, 0], "
               "\"start\": 0.5}],\n  ");
   EXPECT_TRUE(Kept(0.06, text).Runs().window.tried.empty());
+  // The spring's anchors are points of the world at the start: a later start makes another spring.
+  std::string sprung = Kept::Text();
+  sprung.insert(sprung.find(before),
+                "\"springs\": [{\"name\": \"pull\", \"bodies\": [\"bob\", \"world\"], "
+                "\"anchors\": [[0, -1], [1, -1]], \"rest_length\": 1, \"stiffness\": 0.1}],\n  ");
+  EXPECT_TRUE(Kept(0.06, sprung).Runs().window.tried.empty());
   Kept fewer(0.06);
   for (RecordingInput& one : fewer.input.recordings) {
     one.problem.parameters.erase(one.problem.parameters.begin() + 1);
