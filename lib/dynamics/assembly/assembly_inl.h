@@ -231,6 +231,13 @@ class ProblemBuilder {
     JointBlock<T>& block = p_.joints.emplace_back();
     block.a = s_.bodies[s_.supports[k].body].block;
     block.rows = count;
+    block.give.fill(kSupportGive);
+    if (count == 3) {
+      // The torque counts by the arm at which friction gives its largest one, whatever the inertia.
+      const T* mass = &p_.mass[3 * static_cast<size_t>(block.a)];
+      const double arm = SupportArm(model_, s_.supports[k]);
+      if (arm > 0.0) block.give[2] *= ValueOf(mass[2]) / (ValueOf(mass[0]) * arm * arm);
+    }
     for (int r = 0; r < count; ++r) {
       block.row_a[r] = rows[r];
       block.row_b[r] = {T(0.0), T(0.0), T(0.0)};

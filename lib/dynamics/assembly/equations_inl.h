@@ -363,16 +363,28 @@ class Equations {
     const T* twist = TwistOf(support, at, point, buffer);
     const Vector2<T> velocity(twist[0] - twist[2] * arm.y(), twist[1] + twist[2] * arm.x());
     const T square = velocity.squaredNorm();
+    if (at.secant > 0.0) {
+      const T damping = limit / sqrt(T(square + at.secant * at.secant));
+      DampenSupport(support.body, PointRow(Vector2<T>(T(1.0), T(0.0)), arm), damping);
+      DampenSupport(support.body, PointRow(Vector2<T>(T(0.0), T(1.0)), arm), damping);
+      return;
+    }
     if (!(ValueOf(square) > 0.0)) return;
     const T speed = sqrt(square);
     const Vector2<T> along = velocity / speed;
     const RowPart<T> none{T(0.0), T(0.0), T(0.0)};
     b_.Push(support.body, PointRow(along, arm), s_.world(), none, T(-limit));
     const RowPart<T> across = PointRow(Vector2<T>(-along.y(), along.x()), arm);
+    if (kLevel == Level::kVelocity || at.is_sought) {
+      DampenSupport(support.body, across, T(limit / speed));
+    }
+  }
+
+  void DampenSupport(int body, const RowPart<T>& row, const T& damping) {
     if constexpr (kLevel == Level::kVelocity) {
-      b_.Along(support.body, across, s_.world(), none, T(0.0), T(limit / speed));
-    } else if (at.is_sought) {
-      b_.Dampen(support.body, across, T(limit / speed));
+      b_.Along(body, row, s_.world(), {T(0.0), T(0.0), T(0.0)}, T(0.0), damping);
+    } else {
+      b_.Dampen(body, row, damping);
     }
   }
 
@@ -392,6 +404,7 @@ class Equations {
     T buffer[3], friction[3], own[3];
     const T* x = b_.Numbers(support.numbers, 3, buffer);
     const T* twist = TwistOf(support, at, 0, own);
+    if (at.secant > 0.0) return DiscSecantOf(support, at, x);
     DiscFriction(x[SupportIndex::kRadius], twist, friction);
     const T limit = Weight() * x[SupportIndex::kFriction] * x[SupportIndex::kLoad];
     const double weight = ValueOf(limit);
@@ -399,6 +412,17 @@ class Equations {
     for (T& component : friction) component *= limit;
     b_.AddForce(support.body, friction);
     if (kLevel == Level::kVelocity || at.is_sought) DiscDampersOf(support, at, radius, weight);
+  }
+
+  void DiscSecantOf(const SupportIndex& support, const SupportState& at, const T* x) {
+    const T limit = Weight() * x[SupportIndex::kFriction] * x[SupportIndex::kLoad];
+    double dampers[3];
+    DiscSecant(ValueOf(x[SupportIndex::kRadius]), at.twist.data(), at.secant, dampers);
+    for (int r = 0; r < 3; ++r) {
+      RowPart<T> row{T(0.0), T(0.0), T(0.0)};
+      row[r] = T(1.0);
+      DampenSupport(support.body, row, T(limit * dampers[r]));
+    }
   }
 
   void DiscDampersOf(const SupportIndex& support, const SupportState& at, double radius,

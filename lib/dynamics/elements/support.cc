@@ -72,6 +72,15 @@ void DiscDampers(double radius, const double twist[3], double rows[3][3], double
   }
 }
 
+void DiscSecant(double radius, const double twist[3], double secant, double dampers[3]) {
+  const double at[3] = {std::hypot(twist[0], twist[1], secant), 0.0,
+                        std::hypot(twist[2], secant / radius)};
+  double friction[3];
+  DiscFriction(radius, at, friction);
+  dampers[0] = dampers[1] = -friction[0] / at[0];
+  dampers[2] = -friction[2] / at[2];
+}
+
 void SupportFriction::Set(const Model<double>& model, const State<double>& state,
                           const SupportIndex& support, double weight) {
   const double* x = &model.parameters[support.numbers];

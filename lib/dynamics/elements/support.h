@@ -44,6 +44,23 @@ void DiscFriction(const T& radius, const T twist[3], T friction[3]);
 /// Of a disc with μ N = 1 at a twist that is not 0: Ψ'' as Σ weight rowᵀ row over three rows.
 void DiscDampers(double radius, const double twist[3], double rows[3][3], double weights[3]);
 
+/// Friction of a disc with μ N = 1 as dampers, the quotients of −friction and twist (−f / v, N s/m,
+/// and −torque / ω, N m s), whose parts count at least as `secant`, m/s, of the rim.
+void DiscSecant(double radius, const double twist[3], double secant, double dampers[3]);
+
+/// The largest torque of a support about the centre of mass, over μ N, m.
+template <typename T>
+double SupportArm(const Model<T>& model, const SupportIndex& support) {
+  const T* x = &model.parameters[support.numbers];
+  if (support.kind == SupportIndex::kDisc) return 2.0 / 3.0 * ValueOf(x[SupportIndex::kRadius]);
+  double arm = 0.0;
+  for (int i = 0; support.kind == SupportIndex::kPoints && i < support.num_points; ++i) {
+    const T* point = &model.parameters[support.Point(i)];
+    arm += ValueOf(point[2]) * std::hypot(ValueOf(point[0]), ValueOf(point[1]));
+  }
+  return arm;
+}
+
 /// The velocity of a point at an arm from the centre of mass, at a twist.
 template <typename T, typename U>
 Vector2<T> VelocityAtArm(const Vector2<T>& arm, const U twist[3]) {

@@ -21,6 +21,9 @@ struct SupportState {
   bool is_sought = false;
   /// The twist of the body about which the friction of the points that slide is linearised.
   std::array<double, 3> twist{};
+  /// Where Newton's method goes round in circles: s > 0, m/s, and friction is −μ N v / √(v̂² + s²),
+  /// a damper, in all that slides.
+  double secant = 0.0;
   bool IsSlow(int point) const { return slow == kBody || slow == point; }
   friend bool operator==(const SupportState&, const SupportState&) = default;
 };

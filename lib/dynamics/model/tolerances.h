@@ -43,6 +43,10 @@ inline constexpr double kRimCentre = 1e-12;
 /// Of the speed that a body would have without its support: slower points of the body alone are
 /// held; a smoothed dissipation leaves less where 5e-11 of a limit are left.
 inline constexpr double kHeldPoint = 1e-10;
+/// One over the share of a joint or contact: what a support gives where both keep the same motion,
+/// so that it needs no more force than it must. The square of that share is far below the tolerance
+/// of its limit, and a proximal step still gains five digits.
+inline constexpr double kSupportGive = 1e5;
 /// Of the speed that a body would have without its support: where all points are faster the
 /// dissipation is smooth enough for Newton's method without smoothing it.
 inline constexpr double kSlowPoint = 1e-4;

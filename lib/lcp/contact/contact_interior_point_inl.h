@@ -107,7 +107,7 @@ class InteriorPointSystem {
         } else if (p_.redundant_joints) {
           // Where joints form loops their rows may be dependent. A proximal term keeps K regular
           // and does not change the solution, as it acts on the change of y only.
-          diagonal[4 * r] = T(kProximal * JointMobility(p_.mass, joint, r));
+          diagonal[4 * r] = T(kProximal * joint.give[r] * JointMobility(p_.mass, joint, r));
         }
       }
       const auto add = [&](const RowPart<T>* rows) {

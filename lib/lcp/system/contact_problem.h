@@ -76,6 +76,9 @@ struct JointBlock {
   /// Of a coupling, whose only row touches up to two more blocks; c < 0: it does not.
   int c = -1, d = -1;
   RowPart<T> row_c, row_d;
+  /// Factors of the proximal terms of its rows: what redundant rows leave open is shared in inverse
+  /// proportion to them.
+  std::array<double, 3> give{1.0, 1.0, 1.0};
 };
 
 template <typename T>
@@ -256,6 +259,17 @@ void ForEachImpulse(const ContactProblem<double>& problem, const ContactSolution
     visit(contact.a, contact.tangent_a, solution.tangent_impulse[i]);
     visit(contact.b, contact.tangent_b, solution.tangent_impulse[i]);
   }
+}
+
+/// The largest `give` of joints that may be redundant; 1 where there are none. Friction of a given
+/// limit gives as much: it shares with supports what both hold by their friction.
+template <typename T>
+double LargestGive(const ContactProblem<T>& problem) {
+  double give = 1.0;
+  for (const JointBlock<T>& joint : problem.joints) {
+    if (problem.redundant_joints && joint.rows > 0) give = std::max(give, joint.give[0]);
+  }
+  return give;
 }
 
 /// The sign of the sliding speed of a contact without friction, along which friction would act as

@@ -45,7 +45,8 @@ struct ResidualScratch {
 };
 
 // The residual is relative to the terms of each body itself: those of a heavy body would hide the
-// error of a light one.
+// error of a light one. What a body at rest keeps of its last step's rounding is no such term: the
+// least scale is the momentum of the body at a share of the fastest speed.
 double MomentumResidual(const ContactProblem<double>& problem,
                         const ContactSolution<double>& solution, ResidualScratch* scratch) {
   const ContactScales& scales = scratch->scales;
@@ -100,7 +101,8 @@ double MomentumResidual(const ContactProblem<double>& problem,
     const double* x = &left[3 * body];
     const double* of = &terms[3 * body];
     const double missing = std::max({std::abs(x[0]), std::abs(x[1]), std::abs(x[2]) / lever});
-    const double scale = std::max({of[0], of[1], of[2] / lever});
+    const double least = kLeastMomentum * problem.mass[3 * body] * scales.fastest();
+    const double scale = std::max({of[0], of[1], of[2] / lever, least});
     // Terms that overflow would make every residual seem small.
     if (!std::isfinite(scale) || std::isnan(x[0] + x[1] + x[2])) return HUGE_VAL;
     worst = std::max(worst, ShareOf(missing, scale));
@@ -161,8 +163,25 @@ void ContactScales::ComputeSpeeds(const ContactProblem<double>& problem,
     total_ += mass[3 * body] * speed[body];
     fastest_ = std::max(fastest_, speed[body]);
   }
+  AddGivenFriction(problem, solution);
   for (double& of_body : speed) {
     of_body = std::max(of_body, kSlowest * fastest_);
+  }
+}
+
+void ContactScales::AddGivenFriction(const ContactProblem<double>& problem,
+                                     const ContactSolution<double>& solution) {
+  for (size_t i = 0; i < problem.contacts.size(); ++i) {
+    const ContactBlock<double>& contact = problem.contacts[i];
+    if (!contact.limit_given) continue;
+    const auto add = [&](int body, const RowPart<double>& row) {
+      if (body < 0) return;
+      const double size = RowSize(row, lever[body]) * std::abs(solution.tangent_impulse[i]);
+      total_ = std::max(total_, size);
+      fastest_ = std::max(fastest_, size / problem.mass[3 * body]);
+    };
+    add(contact.a, contact.tangent_a);
+    add(contact.b, contact.tangent_b);
   }
 }
 

@@ -31,6 +31,8 @@ struct ContactScales {
     Compute(problem, solution);
   }
   void Compute(const ContactProblem<double>& problem, const ContactSolution<double>& solution);
+  /// The speed of the fastest solved or free twist, m/s.
+  double fastest() const { return fastest_; }
 
  private:
   /// Computes the speeds of the solved and the free twists, with radii of gyration as levers.
@@ -38,10 +40,14 @@ struct ContactScales {
                      const ContactSolution<double>& solution);
   /// Adds the speeds that impulses cause; false where a lever is too short.
   bool AddPushes(const ContactProblem<double>& problem, const ContactSolution<double>& solution);
+  /// Friction of a given limit is a load as those of bodies are: a motor that its joint's friction
+  /// holds at rest leaves all twists rounding.
+  void AddGivenFriction(const ContactProblem<double>& problem,
+                        const ContactSolution<double>& solution);
   void RaiseLevers(const ContactProblem<double>& problem, const ContactSolution<double>& solution);
 
-  double total_ = 0.0;    ///< momentum of all bodies, N s
-  double fastest_ = 0.0;  ///< speed of a solved or free twist, m/s
+  double total_ = 0.0;  ///< momentum of all bodies, N s
+  double fastest_ = 0.0;
 };
 
 /// The values of a contact's rows at a solution, with their scales.

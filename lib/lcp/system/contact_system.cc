@@ -72,6 +72,7 @@ void ContactSystem::MoveFactorsTo(ContactSystem* other) {
   regularisation_.swap(other->regularisation_);
   other->num_blocks_ = num_blocks_;
   other->regularised_ = regularised_;
+  other->give_ = give_;
   other->masses_differ_ = masses_differ_;
   other->condensed_ = condensed_;
   other->fraction_ = fraction_;
@@ -179,7 +180,7 @@ void ContactSystem::AddJoints(const ContactProblem<double>& problem, double regu
       if (r >= joint.rows) {
         diagonal[4 * r] = 1.0;
       } else if (problem.redundant_joints) {
-        diagonal[4 * r] = regularisation * JointMobility(problem.mass, joint, r);
+        diagonal[4 * r] = regularisation * joint.give[r] * JointMobility(problem.mass, joint, r);
         regularisation_[3 * (block - 1) + r] = diagonal[4 * r];
       }
     }
@@ -256,7 +257,8 @@ void ContactSystem::RegulariseContacts(const ContactProblem<double>& problem,
       delta[0] = fraction_ * RowMobility(problem.mass, c.a, c.normal_a, c.b, c.normal_b);
     }
     if (modes[i] == ContactMode::kSticking) {
-      delta[1] = fraction_ * RowMobility(problem.mass, c.a, c.tangent_a, c.b, c.tangent_b);
+      delta[1] = fraction_ * (c.limit_given ? give_ : 1.0) *
+                 RowMobility(problem.mass, c.a, c.tangent_a, c.b, c.tangent_b);
     }
   }
 }
@@ -282,6 +284,7 @@ bool ContactSystem::FactorAs(bool condensed, const ContactProblem<double>& given
   lu_.SetZero();
   NarrowBlocks(problem);
   regularisation_.assign(3 * static_cast<size_t>(num_blocks_), 0.0);
+  give_ = LargestGive(problem);
   RegulariseContacts(problem, modes);
   AddBodies(problem);
   AddJoints(problem, fraction_);
@@ -476,8 +479,10 @@ double ContactSystem::Refine(const ContactProblem<double>& problem,
   bool lessens = true;
   for (int i = 0; i < kMaxRefinements && lessens; ++i) {
     bool all_refined = true;
+    // Rows that give more keep more of their proximal term than the others' rounding.
+    const bool must = i == 0 && give_ > 1.0;
     for (int c = 0; c < columns; ++c) {
-      refined[c] = refined[c] != 0 || !(sizes[c].ToParts() > goal) ? 1 : 0;
+      refined[c] = refined[c] != 0 || !(must || sizes[c].ToParts() > goal) ? 1 : 0;
       all_refined = all_refined && refined[c] != 0;
     }
     if (all_refined) {
@@ -493,7 +498,7 @@ double ContactSystem::Refine(const ContactProblem<double>& problem,
     residual(&next_sizes);
     // For a derivative the first round is always kept.
     const bool derivative = goal < kResidualGoal;
-    lessens = derivative && i == 0;
+    lessens = (derivative && i == 0) || must;
     for (int c = 0; c < columns; ++c) {
       const double before = sizes[c].ToParts();
       const double left = next_sizes[c].ToParts();
@@ -501,7 +506,7 @@ double ContactSystem::Refine(const ContactProblem<double>& problem,
       lessens = lessens || (halves && before > kResidualGoal);
       // The contradictory part of redundant rows does not fall, nor does rounding; neither must
       // prevent the rest of the column from being improved.
-      const bool stays = derivative && left <= std::max(kStays * before, kResidualGoal);
+      const bool stays = (derivative || must) && left <= std::max(kStays * before, kResidualGoal);
       if (refined[c] != 0 || halves || stays) {
         sizes[c] = next_sizes[c];
         continue;

@@ -30,6 +30,9 @@ inline constexpr double kSpanned = 1e-10;
 /// Of the speed of the fastest body: the least scale of a speed: a smaller one times 1e-10 would be
 /// the rounding of the fastest body.
 inline constexpr double kSlowest = 1e-6;
+/// Of a body's momentum at that speed: the least scale of its momentum, of which 1e-10 is some
+/// roundings of the impulses on its neighbours.
+inline constexpr double kLeastMomentum = 1e-5;
 /// Of the longest arm of a body's rows, m: the least lever of its rotation.
 inline constexpr double kLeastLever = 1e-3;
 /// Of the terms of the sliding speed: below it a contact without friction does not slide in either

@@ -168,8 +168,8 @@ class EventSearch {
   void SearchSupports(const Model<double>& model, Event* event);  ///< support_bounds.cc
   void SearchStop(const Model<double>& model, int support, Event* event);
   void SearchLetsGo(const Model<double>& model, int support, Event* event);
-  bool IsShareDetermined(const Model<double>& model, int support, const SupportState& next,
-                         SolvedNode* node) const;
+  bool TakeDeterminedShare(const Model<double>& model, int support, SolvedNode* node,
+                           SupportState* next) const;
   const double* HeldAt(const Model<double>& model, int support, Sample* sample);
   SupportState LetsGoAt(const Model<double>& model, const State<double>& state, int support,
                         const double* held);

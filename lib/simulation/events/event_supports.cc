@@ -140,10 +140,15 @@ bool EventStepper::StopSupports(const Model<double>& model, const Segment& segme
   SpreadTwists(s, stop.solution.motion, &state->twist);
   TakeHeldSpeeds(s, supports, &state->twist);
   for (size_t k = 0; k < s.supports.size(); ++k) {
-    // A joint may keep a body from turning about its held centre.
+    // A joint may keep a body from turning about its held centre: what is left of its turn, or of
+    // the speed that it lost, is rounding.
+    const BodyIndex& body = s.bodies[s.supports[k].body];
     const size_t turn = 3 * static_cast<size_t>(s.supports[k].body) + 2;
+    const double lever = std::sqrt(model.parameters[body.inertia] / model.parameters[body.mass]);
+    const double speed = std::hypot(before[turn - 2], before[turn - 1], lever * before[turn]);
+    const double left = std::abs(state->twist[turn]);
     const bool stops = supports[k].holds >= 0 && s.supports[k].kind == SupportIndex::kCentre &&
-                       std::abs(state->twist[turn]) <= kStoppedTurn * std::abs(before[turn]);
+                       (lever * left <= kStoppedTurn * speed || left < kNoTurn);
     if (stops) state->twist[turn] = 0.0;
   }
   stop.new_twist = state->twist;

@@ -110,9 +110,10 @@ class ModeElimination {
     for (const DamperBlock<T>& d : p.dampers) {
       AddProduct(d.a, d.row_a, d.b, d.row_b, d.weight, &k);
     }
-    const auto add = [&](int row, int a, const RowPart<T>& row_a, int b, const RowPart<T>& row_b) {
+    const auto add = [&](int row, int a, const RowPart<T>& row_a, int b, const RowPart<T>& row_b,
+                         double gives = 1.0) {
       const double mobility = RowMobility(p.mass, a, row_a, b, row_b);
-      k(row, row) += T(delta * mobility);
+      k(row, row) += T(delta * gives * mobility);
       for (int i = 0; i < 3; ++i) {
         if (a >= 0) k(row, 3 * a + i) += row_a[i];
         if (b >= 0) k(row, 3 * b + i) += row_b[i];
@@ -125,13 +126,14 @@ class ModeElimination {
         if (b >= 0) k(3 * b + i, column) -= factor * row_b[i];
       }
     };
+    const double give = LargestGive(p);
     int row = bodies;
     for (const JointBlock<T>& joint : p.joints) {
       for (int r = 0; r < joint.rows; ++r, ++row) {
-        add(row, joint.a, joint.row_a[r], joint.b, joint.row_b[r]);
+        add(row, joint.a, joint.row_a[r], joint.b, joint.row_b[r], joint.give[r]);
         add_force(row, joint.a, joint.row_a[r], joint.b, joint.row_b[r], T(1.0));
         if (joint.c < 0) continue;
-        add(row, joint.c, joint.row_c, joint.d, joint.row_d);
+        add(row, joint.c, joint.row_c, joint.d, joint.row_d, joint.give[r]);
         add_force(row, joint.c, joint.row_c, joint.d, joint.row_d, T(1.0));
       }
     }
@@ -148,7 +150,7 @@ class ModeElimination {
       }
       add_force(at, c.a, c.normal_a, c.b, c.normal_b, T(1.0));
       if (modes[i] == ContactMode::kSticking) {
-        add(at + 1, c.a, c.tangent_a, c.b, c.tangent_b);
+        add(at + 1, c.a, c.tangent_a, c.b, c.tangent_b, c.limit_given ? give : 1.0);
         add_force(at + 1, c.a, c.tangent_a, c.b, c.tangent_b, T(1.0));
       } else {
         // A torque at its limit follows the normal impulse of the contact before it.

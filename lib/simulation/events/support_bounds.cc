@@ -170,20 +170,37 @@ SupportState EventSearch::LetsGoAt(const Model<double>& model, const State<doubl
   return next;
 }
 
-// Whether what a support would have to give along the motion that it lets begin is determined: of
-// bodies that touch, or that joints connect, while their supports hold them the shares are not.
-// Together they may hold what the share of one is too large for; whether they do is decided as the
-// next motion starts, for all of them at once.
-bool EventSearch::IsShareDetermined(const Model<double>& model, int support,
-                                    const SupportState& next, SolvedNode* node) const {
+// Takes from the motion that a support lets begin what joints keep the body from, along which the
+// share of the support is not determined, and returns whether anything is left. Of bodies that
+// touch, or that joints connect, while their supports hold them no share is. Together they may hold
+// what the share of one is too large for; whether they do is decided as the next motion starts, for
+// all of them at once. The support has a larger proximal term than joints (kSupportGive), so that
+// what cannot be met of a right-hand side stays in its rows.
+bool EventSearch::TakeDeterminedShare(const Model<double>& model, int support, SolvedNode* node,
+                                      SupportState* next) const {
+  constexpr int kMostTimes = 4;
   const size_t joint = model.structure->joints.size() + static_cast<size_t>(support);
-  std::vector<double> seed(3 * static_cast<size_t>(node->system.num_blocks()), 0.0);
   const size_t row = 3 * (static_cast<size_t>(model.structure->num_blocks()) + joint);
-  for (int r = 0; r < node->problem.joints[joint].rows; ++r) {
-    seed[row + static_cast<size_t>(r)] = next.twist[static_cast<size_t>(r)];
+  const int rows = node->problem.joints[joint].rows;
+  std::vector<double> seed(3 * static_cast<size_t>(node->system.num_blocks()), 0.0);
+  std::vector<double> left(seed.size());
+  double size = 0.0, unmet = HUGE_VAL;
+  for (int r = 0; r < rows; ++r) size = std::max(size, std::abs(next->twist[r]));
+  for (int time = 0; time < kMostTimes; ++time) {
+    std::copy_n(next->twist.begin(), rows, seed.begin() + static_cast<std::ptrdiff_t>(row));
+    std::vector<double> x = seed;
+    unmet = node->system.SolveTransposed(node->problem, node->solution.modes, x.data(), 1);
+    if (unmet <= kFullyDetermined) break;
+    node->system.Residual<true>(node->problem, node->solution.modes, seed.data(), x.data(), 1,
+                                left.data());
+    double remains = 0.0;
+    for (int r = 0; r < rows; ++r) {
+      next->twist[r] -= left[row + static_cast<size_t>(r)];
+      remains = std::max(remains, std::abs(next->twist[r]));
+    }
+    if (!(remains > kLeastMotion * size)) return false;
   }
-  return node->system.SolveTransposed(node->problem, node->solution.modes, seed.data(), 1) <=
-         kDetermined;
+  return unmet <= kDetermined;
 }
 
 // Searches for the time at which a support can no longer hold what it holds.
@@ -195,6 +212,11 @@ void EventSearch::SearchLetsGo(const Model<double>& model, int support, Event* e
     if (held == nullptr) return std::numeric_limits<double>::quiet_NaN();
     return SupportReserve(model, sample.motion.after, support, holds, next.twist, held);
   };
+  const auto tolerance_of = [&](double value) {
+    return kSupportLocated *
+           (std::abs(value) + support_.limit() * std::hypot(next.twist[0], next.twist[1],
+                                                            support_.arm() * next.twist[2]));
+  };
   double a = 0.0;
   for (const double share : {0.5, 1.0}) {
     double b = share * event->length;
@@ -205,7 +227,15 @@ void EventSearch::SearchLetsGo(const Model<double>& model, int support, Event* e
       a = b;
       continue;
     }
-    if (!IsShareDetermined(model, support, beyond, EndOf(model, At(model, b)))) return;
+    if (!TakeDeterminedShare(model, support, EndOf(model, At(model, b)), &beyond)) return;
+    next = beyond;
+    const double left = value_of(*At(model, b));
+    // More than it can hold is what joints hold as well, or the rest of what they should: a force
+    // that is as large as the friction, and no larger, is held.
+    if (left >= -tolerance_of(left)) {
+      a = b;
+      continue;
+    }
     Event trial;
     trial.kind = EventKind::kSupportLetsGo;
     trial.contact = ContactOfSupport(*model.structure, support);
@@ -216,10 +246,7 @@ void EventSearch::SearchLetsGo(const Model<double>& model, int support, Event* e
       const double fb = value_of(*At(model, b));
       const double fa = value_of(*At(model, a));
       if (std::isnan(fa) || std::isnan(fb)) return;
-      const double tolerance =
-          kSupportLocated *
-          (std::abs(fb) + support_.limit() * std::hypot(next.twist[0], next.twist[1],
-                                                        support_.arm() * next.twist[2]));
+      const double tolerance = tolerance_of(fb);
       trial.length = fa <= tolerance    ? a
                      : fb >= -tolerance ? b
                                         : Refine(model, value_of, tolerance, a, fa, b, fb);
@@ -229,6 +256,7 @@ void EventSearch::SearchLetsGo(const Model<double>& model, int support, Event* e
       beyond =
           LetsGoAt(model, at_root->motion.after, support, HeldAt(model, support, At(model, b)));
       if (beyond.slow == SupportState::kNothing) break;
+      if (!TakeDeterminedShare(model, support, EndOf(model, At(model, b)), &beyond)) break;
     }
     *event = trial;
     return;

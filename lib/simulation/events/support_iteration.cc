@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "tangible/simulation/events/tolerances.h"
 
@@ -28,11 +29,16 @@ void SupportIteration::Start(const Model<double>& model, double h,
   const ModelStructure& s = *model.structure;
   h_ = h;
   iterations_ = 0;
-  residual_ = HUGE_VAL;
-  is_about_ = false;
+  residual_ = before_dampers_ = HUGE_VAL;
+  is_about_ = has_held_standing_ = false;
+  newton_left_ = kNewton;
+  dampers_left_ = 0;
+  dampers_ = kDampers;
   before->supports.resize(s.supports.size());
   residuals_.resize(s.supports.size());
   turns_.assign(s.supports.size(), 0);
+  has_share_.assign(s.supports.size(), 0);
+  damped_.resize(s.supports.size());
   at_rest_ = are_at_rest;
   for (size_t k = 0; k < s.supports.size(); ++k) {
     if (!at_rest_.empty() && at_rest_[k] == 0) continue;
@@ -78,10 +84,10 @@ void SupportIteration::ImpulseOf(const SupportState& at, const double twist[3], 
 }
 
 // How far the support is from Coulomb's law at the new twist, of μ N.
-double SupportIteration::ResidualOf(const SupportState& at, const double mass[3],
+double SupportIteration::ResidualOf(const SupportState& at, bool has_share, const double mass[3],
                                     const double twist[3], const double* held) const {
   const double limit = friction_.limit();
-  if (!(limit > 0.0)) return 0.0;
+  if (!(limit > 0.0) || (has_share && at.holds == SupportState::kBody)) return 0.0;
   const double slow = kStandingPoint * limit / mass[0];
   const double arm = friction_.arm();
   // How far an impulse goes beyond what the support can hold, by the motion it would give.
@@ -106,6 +112,7 @@ double SupportIteration::ResidualOf(const SupportState& at, const double mass[3]
   double residual = 0.0;
   for (size_t i = 0; i < friction_.points().size(); ++i) {
     const SupportPoint& point = friction_.points()[i];
+    if (static_cast<int>(i) == at.holds && has_share) continue;
     if (static_cast<int>(i) == at.holds) {
       double held_limit = 0.0;  // points at the same place are held together
       for (const SupportPoint& other : friction_.points()) {
@@ -215,29 +222,169 @@ bool SupportIteration::Release(State<double>* before) {
   return any;
 }
 
+template <typename Visit>
+void SupportIteration::ForEach(const Model<double>& model, const ContactProblem<double>& problem,
+                               const ContactSolution<double>& solution, const State<double>& before,
+                               const Visit& visit) {
+  const ModelStructure& s = *model.structure;
+  for (size_t k = 0; k < s.supports.size(); ++k) {
+    if (!at_rest_.empty() && at_rest_[k] == 0) continue;
+    const size_t row = 3 * static_cast<size_t>(s.bodies[s.supports[k].body].block);
+    friction_.Set(model, before, s.supports[k], h_);
+    visit(k, &problem.mass[row], &solution.motion[row],
+          &solution.joint_impulse[3 * (s.joints.size() + k)]);
+  }
+}
+
+// Of what slides; a body that has no friction slides without.
+void SupportIteration::GoOnWithDampers(const Model<double>& model,
+                                       const ContactProblem<double>& problem,
+                                       const ContactSolution<double>& solution,
+                                       State<double>* before) {
+  // The first round begins at the last twists of Newton's method; others go on where it ended.
+  const bool begins = dampers_left_ == 0;
+  const bool is_first = begins ? dampers_ == kDampers : dampers_ == 2 * kDampers;
+  if (begins) {
+    before_dampers_ = residual_;
+    dampers_left_ = std::exchange(dampers_, 2 * dampers_);
+    smoothing_ = is_first ? 1.0 : kDamperSmoothing;
+  } else {
+    if (is_first) smoothing_ *= std::pow(kDamperSmoothing, 1.0 / kDampers);
+    --dampers_left_;
+  }
+  bool settles = true;
+  size_t part = 0;
+  ratios_.swap(last_ratios_);
+  ForEach(model, problem, solution, *before,
+          [&](size_t k, const double* mass, const double* twist, const double*) {
+            SupportState& at = before->supports[k];
+            const size_t first = std::exchange(part, part + NumParts());
+            if (!(friction_.limit() > 0.0)) return;
+            ratios_.resize(part);
+            last_ratios_.resize(part);
+            for (size_t i = first; i < part; ++i) {
+              ratios_[i] = begins ? 0.0 : RatioOf(at, i - first, twist);
+            }
+            if (!begins && dampers_left_ == 0) {
+              std::copy_n(twist, 3, damped_[k].begin());
+              settles = Classify(twist, &ratios_[first], &last_ratios_[first], &at) && settles;
+              has_share_[k] = at.holds != SupportState::kNothing;
+              return;
+            }
+            at = SupportState();
+            if (begins && !is_first) {
+              at.twist = damped_[k];
+            } else {
+              std::copy_n(twist, 3, at.twist.begin());
+            }
+            at.secant = smoothing_ * friction_.limit() / mass[0];
+          });
+  if (dampers_left_ == 0) newton_left_ = kNewtonAfterwards;
+  if (!settles) std::fill(has_share_.begin(), has_share_.end(), 0);
+  ++iterations_;
+  residual_ = HUGE_VAL;
+}
+
+double SupportIteration::RatioOf(const SupportState& at, size_t part, const double twist[3]) const {
+  const double* about = at.twist.data();
+  if (friction_.is_disc()) {
+    const double arm = friction_.arm();
+    return std::hypot(twist[0], twist[1], arm * twist[2]) /
+           std::hypot(std::hypot(about[0], about[1], arm * about[2]), at.secant);
+  }
+  double from[2], to[2];
+  friction_.points()[part].VelocityAt(about, from);
+  friction_.points()[part].VelocityAt(twist, to);
+  return std::hypot(to[0], to[1]) / std::hypot(from[0], from[1], at.secant);
+}
+
+// What is held keeps its ratio, which is below 1, and slows down without end; that of what slides
+// approaches 1.
+bool SupportIteration::Classify(const double twist[3], const double* ratios, const double* before,
+                                SupportState* at) const {
+  SupportState next;
+  std::copy_n(twist, 3, next.twist.begin());
+  bool settles = true;
+  int held = 0;
+  for (size_t i = 0; i < NumParts(); ++i) {
+    const double missing = 1.0 - ratios[i];
+    if (missing >= 1.0 - kHeldByDampers &&
+        std::abs(ratios[i] - before[i]) <= kSteadyRatio * missing) {
+      ++held;
+      next.holds = held == 1 ? static_cast<int>(i) : static_cast<int>(SupportState::kBody);
+    } else {
+      settles = settles && std::abs(missing) <= kSteadyRatio;
+    }
+  }
+  if (friction_.is_disc() && held == 1) next.holds = SupportState::kBody;
+  if (next.holds == SupportState::kBody || (held == 1 && friction_.points().size() == 1)) {
+    next.twist = {};
+  }
+  *at = next;
+  return settles;
+}
+
+bool SupportIteration::Stands(const SupportState& at, const double mass[3],
+                              const double twist[3]) const {
+  if (at.holds == SupportState::kBody || !(friction_.limit() > 0.0)) return false;
+  const double slow = kStandingPoint * friction_.limit() / mass[0];
+  if (friction_.is_disc()) {
+    return std::hypot(twist[0], twist[1], friction_.arm() * twist[2]) <= slow;
+  }
+  if (at.holds == 0 && friction_.points().size() == 1) return false;
+  return std::all_of(friction_.points().begin(), friction_.points().end(),
+                     [&](const SupportPoint& point) {
+                       double velocity[2];
+                       point.VelocityAt(twist, velocity);
+                       return std::hypot(velocity[0], velocity[1]) <= slow;
+                     });
+}
+
+bool SupportIteration::HoldStanding(const Model<double>& model,
+                                    const ContactProblem<double>& problem,
+                                    const ContactSolution<double>& solution,
+                                    State<double>* before) {
+  if (std::exchange(has_held_standing_, true)) return false;
+  bool any = false;
+  ForEach(model, problem, solution, *before,
+          [&](size_t k, const double* mass, const double* twist, const double*) {
+            SupportState& at = before->supports[k];
+            if (!Stands(at, mass, twist)) return;
+            const bool is_point = !friction_.is_disc() && friction_.points().size() == 1;
+            at = SupportState();
+            at.holds = is_point ? 0 : static_cast<int>(SupportState::kBody);
+            has_share_[k] = 1;  // that of this solve
+            any = true;
+          });
+  if (!any) return false;
+  ++iterations_;
+  residual_ = HUGE_VAL;
+  return true;
+}
+
 bool SupportIteration::Accept(const Model<double>& model, const ContactProblem<double>& problem,
                               const ContactSolution<double>& solution, State<double>* before) {
   const ModelStructure& s = *model.structure;
+  if (dampers_left_ > 0) {
+    GoOnWithDampers(model, problem, solution, before);
+    return false;
+  }
   const double last = residual_;
   const auto visit = [&](const auto& of_support) {
-    for (size_t k = 0; k < s.supports.size(); ++k) {
-      if (!at_rest_.empty() && at_rest_[k] == 0) continue;
-      const size_t row = 3 * static_cast<size_t>(s.bodies[s.supports[k].body].block);
-      friction_.Set(model, *before, s.supports[k], h_);
-      of_support(k, &problem.mass[row], &solution.motion[row],
-                 &solution.joint_impulse[3 * (s.joints.size() + k)]);
-    }
+    ForEach(model, problem, solution, *before, of_support);
   };
   residual_ = 0.0;
   double away = 0.0;
   visit([&](size_t k, const double* mass, const double* twist, const double* held) {
     away = std::max(away, AwayFrom(before->supports[k], mass, twist));
-    residuals_[k] = ResidualOf(before->supports[k], mass, twist, held);
+    residuals_[k] = ResidualOf(before->supports[k], has_share_[k] != 0, mass, twist, held);
     if (residuals_[k] < residual_) return;
     residual_ = residuals_[k];
     worst_body_ = s.supports[k].body;
   });
-  if (residual_ <= kSupportSettled && (away <= kSupportAbout || is_about_)) return true;
+  if (residual_ <= kSupportSettled && (away <= kSupportAbout || is_about_)) {
+    return !HoldStanding(model, problem, solution, before);
+  }
   if (residual_ <= kSupportSettled) {
     is_about_ = true;
     ++iterations_;
@@ -247,7 +394,13 @@ bool SupportIteration::Accept(const Model<double>& model, const ContactProblem<d
     });
     return false;
   }
-  if (residual_ <= s.settings.lcp_tolerance && residual_ > 0.5 * last) return true;
+  if (residual_ <= s.settings.lcp_tolerance && residual_ > 0.5 * last) {
+    return !HoldStanding(model, problem, solution, before);
+  }
+  if (--newton_left_ <= 0) {
+    GoOnWithDampers(model, problem, solution, before);
+    return false;
+  }
   ++iterations_;
   visit([&](size_t k, const double* mass, const double* twist, const double* held) {
     if (residuals_[k] > kSupportSettled)

@@ -11,11 +11,21 @@
 // Newton's method: û is the new twist of the last solve. What is held, and û where a point turned
 // round, are those of the body alone, with the impulses that everything but its support gave it in
 // the last solve: for a body that nothing touches the first solve is the solution. One that turns
-// round again is held as a whole, which joints and contacts may do where it alone would go on. A
-// body of given
+// round again is held as a whole, which joints and contacts may do where it alone would go on.
+// Where that goes round in circles, as where a hinge leaves a body one motion that the body alone
+// would not choose, friction becomes dampers for a number of solves, of which each solution is the
+// next û (the majorisation of Weiszfeld, with a smoothing that vanishes): they approach the
+// solution without leaving it again, slowly, and tell by |v⁺| / |û|, which is |f| / (μ N), what is
+// held.
+// Newton's method goes on from there, and after that more dampers. Of bodies that are held together
+// the shares are not determined, and those of the solve may exceed what one can give where others
+// could give more: the dampers have found shares with which all are held.
+// A body of given
 // motion may push others however large their friction: where a problem has no solution with what is
 // held, all of it is let go, and û is the twist that the others then give it.
 
+#include <array>
+#include <cmath>
 #include <vector>
 
 #include "tangible/dynamics/elements/support.h"
@@ -44,29 +54,61 @@ class SupportIteration {
   bool Release(State<double>* before);
 
   bool has_given_up() const { return iterations_ >= kMostIterations; }
-  double residual() const { return residual_; }  ///< of μ N, at the last solve
+  /// Of μ N, at the last solve without dampers.
+  double residual() const { return std::isfinite(residual_) ? residual_ : before_dampers_; }
   int worst_body() const { return worst_body_; }
 
  private:
-  static constexpr int kMostIterations = 100;
+  static constexpr int kNewton = 10;           ///< solves before the dampers
+  static constexpr int kNewtonAfterwards = 8;  ///< and after them
+  static constexpr int kDampers = 12;          ///< in the first round; the next has twice as many
+  static constexpr int kMostIterations = 130;
 
-  double ResidualOf(const SupportState& at, const double mass[3], const double twist[3],
-                    const double* held) const;
+  /// `has_share`: what the support holds is known to be within its limit.
+  double ResidualOf(const SupportState& at, bool has_share, const double mass[3],
+                    const double twist[3], const double* held) const;
   void Linearise(const double mass[3], const double twist[3], const double* held, int* turns,
                  SupportState* at) const;
   double AwayFrom(const SupportState& at, const double mass[3], const double twist[3]) const;
+  size_t NumParts() const { return friction_.is_disc() ? 1 : friction_.points().size(); }
+  /// |v⁺| / √(v̂² + s²) of a part of a support with dampers: of the disc, or of a point.
+  double RatioOf(const SupportState& at, size_t part, const double twist[3]) const;
+  /// After the last solve with dampers: what is held, and the twist of what slides, by the ratios
+  /// of the last solve and of the one before. Whether what slides does so by its own twist.
+  bool Classify(const double twist[3], const double* ratios, const double* before,
+                SupportState* at) const;
+  template <typename Visit>
+  void ForEach(const Model<double>& model, const ContactProblem<double>& problem,
+               const ContactSolution<double>& solution, const State<double>& before,
+               const Visit& visit);
+  /// Holds what does not move although it was not held, as where a rail takes all that pushes it:
+  /// derivatives are those of a body that is held. Whether there is anything, the first time.
+  bool HoldStanding(const Model<double>& model, const ContactProblem<double>& problem,
+                    const ContactSolution<double>& solution, State<double>* before);
+  bool Stands(const SupportState& at, const double mass[3], const double twist[3]) const;
+  void GoOnWithDampers(const Model<double>& model, const ContactProblem<double>& problem,
+                       const ContactSolution<double>& solution, State<double>* before);
   void ImpulseOf(const SupportState& at, const double twist[3], const double* held,
                  double impulse[3]) const;
 
   double h_ = 0.0;
   int iterations_ = 0;
   double residual_ = 0.0;
+  double before_dampers_ = HUGE_VAL;
   bool is_about_ = false;  ///< linearised once more since it settled
+  bool has_held_standing_ = false;
+  int newton_left_ = 0;     ///< solves until the next round of dampers
+  int dampers_left_ = 0;    ///< of this round
+  int dampers_ = kDampers;  ///< of the next round
+  double smoothing_ = 1.0;  ///< of the speed that friction gives a body
   int worst_body_ = -1;
   SupportFriction friction_;
   std::vector<double> residuals_;
   std::vector<char> at_rest_;
-  std::vector<int> turns_;  ///< how often each support has turned round in this step
+  std::vector<std::array<double, 3>> damped_;  ///< twists at the end of the last round of dampers
+  std::vector<double> ratios_, last_ratios_;   ///< of the parts of all supports
+  std::vector<char> has_share_;  ///< what it holds has been found within its limit by the dampers
+  std::vector<int> turns_;       ///< how often each support has turned round in this step
 };
 
 }  // namespace tangible

@@ -111,18 +111,23 @@ SupportModes::Course SupportModes::CourseOf(const Model<double>& model, int k, d
   const double unit =
       friction_.limit() / model.parameters[model.structure->bodies[support.body].mass];
   const double stops = std::max(slow, kSlowSupport * unit * dt_);
-  const auto rests = [&](int part) {
+  const auto rest_of = [&](int part) {
     const bool found = std::any_of(rested_.begin(), rested_.end(), [&](const Rested& one) {
       return one.support == k && (one.part == part || one.part == SupportState::kBody);
     });
-    return SpeedOfPart(friction_, part, twist) <=
-           (found ? 2.0 * stops : std::max(slow, kStandingPoint * unit * dt_));
+    return found ? 2.0 * stops : std::max(slow, kStandingPoint * unit * dt_);
   };
+  const auto rests = [&](int part) { return SpeedOfPart(friction_, part, twist) <= rest_of(part); };
   const double speed = SpeedOfPart(friction_, SupportState::kBody, twist);
   speeds_[k] = speed;
   const int whole =
       support.kind == SupportIndex::kCentre ? 0 : static_cast<int>(SupportState::kBody);
-  if (rests(whole)) return Course::kRests;
+  if (rests(whole)) {
+    const BodyIndex& body = model.structure->bodies[support.body];
+    const double lever = std::sqrt(model.parameters[body.inertia] / model.parameters[body.mass]);
+    turns_[k] = lever * std::abs(twist[2]) > rest_of(whole) ? 1 : 0;
+    return Course::kRests;
+  }
   std::copy_n(twist, 3, at->twist.begin());
   for (int i = 0; support.kind == SupportIndex::kPoints && i < support.num_points; ++i) {
     if (rests(i)) at->holds = i;
@@ -158,6 +163,7 @@ void SupportModes::Begin(const Model<double>& model, double slow, Segment* segme
   before.supports.assign(s.supports.size(), SupportState());
   courses_.assign(s.supports.size(), Course::kFree);
   at_rest_.assign(s.supports.size(), 0);
+  turns_.assign(s.supports.size(), 0);
   turned_.assign(s.supports.size(), 0);
   changes_ = 0;
   times_let_go_ = 0;
@@ -375,7 +381,7 @@ bool SupportModes::IsAtRest(const Model<double>& model, const State<double>& bef
   if (body < 0) return true;
   const ModelStructure& s = *model.structure;
   for (size_t k = 0; k < s.supports.size(); ++k) {
-    if (s.supports[k].body == body) return courses_[k] == Course::kRests;
+    if (s.supports[k].body == body) return courses_[k] == Course::kRests && turns_[k] == 0;
   }
   const double* twist = &before.twist[3 * static_cast<size_t>(body)];
   return s.bodies[body].mass < 0 && twist[0] == 0.0 && twist[1] == 0.0 && twist[2] == 0.0;
@@ -391,7 +397,8 @@ bool SupportModes::HasToStop(const Model<double>& model, const Segment& segment)
     if (at.holds == SupportState::kBody) {
       if (twist[0] != 0.0 || twist[1] != 0.0 || twist[2] != 0.0) return true;
     } else if (s.supports[k].kind == SupportIndex::kCentre) {
-      if (twist[0] != 0.0 || twist[1] != 0.0) return true;
+      const bool turns_by_rounding = twist[2] != 0.0 && std::abs(twist[2]) < kNoTurn;
+      if (twist[0] != 0.0 || twist[1] != 0.0 || turns_by_rounding) return true;
     } else if (std::any_of(rested_.begin(), rested_.end(),
                            [&](const Rested& one) { return one.support == static_cast<int>(k); })) {
       return true;

@@ -67,7 +67,7 @@ class SupportModes {
                Segment* segment);
 
  private:
-  static constexpr int kMostChanges = 60;
+  static constexpr int kMostChanges = 150;
   static constexpr int kMostLetGo = 3;
   static constexpr int kMostOfSlow = 12;  ///< changes where a body is slow, and need not be at rest
 
@@ -111,6 +111,7 @@ class SupportModes {
   bool started_ = false;  ///< the iteration of bodies at rest
   std::vector<Course> courses_;
   std::vector<char> at_rest_;
+  std::vector<char> turns_;  ///< the support is at rest, and the body turns about its only point
   std::vector<double> speeds_, last_speeds_;  ///< of supports, in this motion and the one before
   std::vector<int> turned_;  ///< how often the direction of a support has been changed
   std::vector<Rested> rested_;

@@ -137,6 +137,11 @@ inline constexpr double kLeastBack = 1e-5;
 /// Relative residual of a transposed solve: a force at which rows leave no more is determined by
 /// them, while the share of a redundant contact leaves a part of order 1.
 inline constexpr double kDetermined = 1e-6;
+/// The same: what is not determined is taken from a motion down to it.
+inline constexpr double kFullyDetermined = 1e-14;
+/// Of the motion that a support lets begin: where less of it is left free by joints and by what
+/// else holds the body, the share of the support is not determined.
+inline constexpr double kLeastMotion = 0.1;
 /// Of the largest acceleration, or terms that cancel in it: an implicit stage has converged; a
 /// thousand times this is enough where rounding prevents the last digits.
 inline constexpr double kImplicitStage = 1e-14;
@@ -205,6 +210,14 @@ inline constexpr double kSupportAbout = 1e-11;
 /// Of the speed that its friction takes from a body in a step: a point of a support that is slower
 /// has no direction, and any friction within its limit is that of a point at rest.
 inline constexpr double kStandingPoint = 1e-12;
+/// Of the same: down to where the dampers that stand for friction are smoothed at last, and of
+/// μ N: what needs less of its friction than the second is held (Newton's method decides).
+inline constexpr double kDamperSmoothing = 1e-6;
+inline constexpr double kHeldByDampers = 0.999;
+/// Of what the share of its friction that a point needs lacks of 1: where it changes by less from
+/// one solve with dampers to the next the point is held. And absolute: of one that slides it lacks
+/// no more.
+inline constexpr double kSteadyRatio = 0.02;
 /// Of the speed that its friction takes from a body in a time step: a point that slides no faster
 /// and slows down is stopped along its direction, which no longer changes; what that neglects is
 /// this share of a time step long.
@@ -225,6 +238,8 @@ inline constexpr double kSupportDecay = 0.5;
 /// Of the rate before: a body whose centre is stopped and that a joint keeps from turning about it
 /// has a smaller one by rounding alone.
 inline constexpr double kStoppedTurn = 1e-9;
+/// Rad/s: slower is what rounding leaves of rounding; its square has no digits.
+inline constexpr double kNoTurn = 1e-150;
 /// Of dt / 2^k: motions at supports end at multiples of it, up to the rounding of a time.
 inline constexpr double kSupportGridSlack = 1e-3;
 /// The norm of the difference of two unit vectors: the direction in which a point of a support

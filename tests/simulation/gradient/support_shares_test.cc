@@ -1,0 +1,222 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What a support and joints hold together: the support needs to give only what joints do not keep.
+// Against closed forms, and steps of 0.1 ms.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "../../support/gradients.h"
+#include "../../support/scenes.h"
+#include "tangible/simulation/stepping/rollout.h"
+
+namespace tangible {
+namespace {
+
+using test_scenes::SceneOf;
+using testing::ExpectOthersAgree;
+using testing::Jacobian;
+
+constexpr double kGravityThere = 9.81;
+
+// A body of 2 kg on a rail along `axis`; a force along the rail and across it.
+Scene OnARail(const std::string& support, const std::string& axis, const std::string& force,
+              Stepping stepping) {
+  Scene scene = SceneOf(R"({"gravity": [0, 0], "bodies": [
+      {"name": "b", "mass": 2, "inertia": 0.1, "position": [0.3, 0], "support": )" +
+                        support + R"(}], "joints": [{"name": "rail", "type": "prismatic",
+      "bodies": ["b", "world"], "anchor": [0, 0], "axis": )" +
+                        axis + R"(}], "forces": [{"name": "f", "body": "b", "force": )" + force +
+                        R"(}], "simulation": {"dt": 0.01, "duration": 1}})");
+  scene.simulation.stepping = stepping;
+  return scene;
+}
+
+const char* const kSupports[] = {R"({"friction": 0.1})", R"({"friction": 0.1, "radius": 0.1})",
+                                 R"({"friction": 0.1, "points": [[0.1, 0.05], [-0.1, 0.05]]})"};
+
+// Of 1.962 N of friction 1.5 N hold it, whatever pushes it against the rail.
+TEST(SupportSharesTest, ARailTakesWhatPushesAcrossIt) {
+  for (const Stepping stepping : {Stepping::kEvent, Stepping::kFixed}) {
+    for (const char* support : kSupports) {
+      for (const char* force : {"[1.5, -6]", "[-1.9, 60]", "[0, 3]"}) {
+        const GradientResult result = Jacobian(OnARail(support, "[1, 0]", force, stepping),
+                                               {"forces/f/force/x"}, GradientMethod::kTangent);
+        ASSERT_TRUE(result.done) << result.message;
+        EXPECT_EQ(result.values[0], 0.3) << support << force;
+        // The rail leaves its rounding of a body that does not move.
+        for (int i = 1; i < 6; ++i) EXPECT_NEAR(result.values[i], 0.0, 1e-20) << support << force;
+        EXPECT_NEAR(result.jacobian.norm(), 0.0, 1e-15);
+      }
+      // 2.5 N along a rail move it, beside 3.2 N across.
+      const double a = (2.5 - 0.2 * kGravityThere) / 2.0;
+      const GradientResult result =
+          Jacobian(OnARail(support, "[0.8, 0.6]", "[3.92, -1.06]", stepping),
+                   {"forces/f/force/x", "bodies/b/support/friction"}, GradientMethod::kTangent);
+      ASSERT_TRUE(result.done) << result.message;
+      const double share = stepping == Stepping::kEvent ? 0.5 : 0.505;
+      EXPECT_NEAR(result.values[0], 0.3 + 0.8 * share * a, 1e-9) << support;
+      EXPECT_NEAR(result.jacobian(0, 0), 0.8 * share * 0.8 / 2.0, 1e-7) << support;
+      EXPECT_NEAR(result.jacobian(0, 1), -0.8 * share * kGravityThere, 1e-7) << support;
+    }
+  }
+}
+
+// A force that grows as 4 N/s t breaks it loose at 1.962 / 4 s, within a step, while three times as
+// much pushes it across: x = 4 (t - t0)^3 / 12.
+TEST(SupportSharesTest, ItBreaksLooseWhenTheForceAlongTheRailIsTooLarge) {
+  for (const char* support : kSupports) {
+    Scene scene = OnARail(support, "[1, 0]", "[0, -6]", Stepping::kEvent);
+    Signal grows;
+    grows.interpolation = Signal::Interpolation::kLinear;
+    grows.time = {0.0, 1.0};
+    grows.x = {0.0, 4.0};
+    grows.y = {-6.0, -6.0};
+    scene.forces[0].force_signal = grows;
+    const std::vector<std::string> paths = {"bodies/b/support/friction"};
+    const GradientResult result = Jacobian(scene, paths, GradientMethod::kTangent);
+    ASSERT_TRUE(result.done) << result.message;
+    const double moves = 1.0 - 0.2 * kGravityThere / 4.0;
+    EXPECT_NEAR(result.values[0], 0.3 + std::pow(moves, 3) / 3.0, 1e-9) << support;
+    EXPECT_NEAR(result.jacobian(0, 0), -moves * moves * 0.5 * kGravityThere, 1e-7) << support;
+    // What the points could share with the rail is not told by what they do, from 9 / 10 on.
+    if (support != kSupports[2]) {
+      EXPECT_EQ(result.certificate.verdict, "trustworthy") << support;
+    }
+    ExpectOthersAgree(scene, paths, result);
+  }
+}
+
+// A disc on an arm may only turn about the arm's pivot: up to the torque
+// mu N times the mean distance of its points from the pivot it stays.
+TEST(SupportSharesTest, AnArmOnADiscTurnsAboutItsPivot) {
+  constexpr double kArm = 0.3, kRadius = 0.05;
+  double mean = 0.0;
+  constexpr int kRings = 400, kRays = 400;
+  for (int i = 0; i < kRings; ++i) {
+    const double r = kRadius * std::sqrt((i + 0.5) / kRings);
+    for (int k = 0; k < kRays; ++k) {
+      const double angle = 2.0 * M_PI * (k + 0.5) / kRays;
+      mean += std::hypot(kArm + r * std::cos(angle), r * std::sin(angle)) / (kRings * kRays);
+    }
+  }
+  for (const Stepping stepping : {Stepping::kEvent, Stepping::kFixed}) {
+    for (const double part : {0.5, 0.999, 1.001, 1.5}) {
+      Scene scene = SceneOf(R"({"gravity": [0, 0], "bodies": [
+          {"name": "b", "mass": 1, "inertia": 0.1, "position": [0.3, 0],
+           "support": {"friction": 0.5, "radius": 0.05}}],
+          "joints": [{"name": "j", "type": "revolute", "bodies": ["b", "world"],
+                      "anchor": [0, 0]}],
+          "forces": [{"name": "f", "body": "b", "torque": 1}],
+          "simulation": {"dt": 0.001, "duration": 0.1}})");
+      scene.simulation.stepping = stepping;
+      scene.forces[0].torque = part * 0.5 * kGravityThere * mean;
+      const GradientResult result = Jacobian(scene, {"forces/f/torque"}, GradientMethod::kTangent);
+      ASSERT_TRUE(result.done) << result.message;
+      if (part < 1.0) {
+        EXPECT_NEAR(result.values[2], 0.0, 1e-20) << part;
+        EXPECT_NEAR(result.values[5], 0.0, 1e-20) << part;
+        continue;
+      }
+      const double rate = (part - 1.0) * 0.5 * kGravityThere * mean / (0.1 + kArm * kArm) * 0.1;
+      EXPECT_NEAR(result.values[5], rate, 1e-4 * rate) << part;
+    }
+  }
+}
+
+// Of two bodies on a rod one holds at most 1 N and the other one 3 N: 3.9 N are held by both, with
+// shares that no solve of their rows tells, and 4.5 N move both.
+TEST(SupportSharesTest, BodiesHoldTogetherWhatOneCannot) {
+  for (const Stepping stepping : {Stepping::kEvent, Stepping::kFixed}) {
+    for (const char* joint : {R"("distance", "bodies": ["b", "a"], "anchors": [[1, 0], [0, 0]])",
+                              R"("weld", "bodies": ["b", "a"], "anchor": [0.5, 0])"}) {
+      for (const double force : {2.5, 3.9, 4.5, -3.9}) {
+        Scene scene = SceneOf(std::string(R"({"gravity": [0, 0], "bodies": [
+            {"name": "a", "mass": 2, "inertia": 0.1, "position": [0, 0],
+             "support": {"friction": 0.1, "load": 10}},
+            {"name": "b", "mass": 2, "inertia": 0.1, "position": [1, 0],
+             "support": {"friction": 0.3, "load": 10, "radius": 0.1}}],
+            "joints": [{"name": "j", "type": )") +
+                              joint + R"(}],
+            "forces": [{"name": "f", "body": "a", "force": [1, 0]}],
+            "simulation": {"dt": 0.01, "duration": 1}})");
+        scene.simulation.stepping = stepping;
+        scene.forces[0].force[0] = force;
+        const GradientResult result =
+            Jacobian(scene, {"forces/f/force/x"}, GradientMethod::kTangent);
+        ASSERT_TRUE(result.done) << joint << force << result.message;
+        const bool moves = force > 4.0;
+        const double half = stepping == Stepping::kEvent ? 0.5 : 0.505;
+        EXPECT_NEAR(result.values[0], moves ? half * 0.5 / 4.0 : 0.0, 1e-9) << joint << force;
+        EXPECT_NEAR(result.values[6], 1.0 + result.values[0], 1e-12) << joint << force;
+        EXPECT_NEAR(result.jacobian(0, 0), moves ? half / 4.0 : 0.0, 1e-8) << joint << force;
+      }
+    }
+  }
+}
+
+// A force along the rail that is exactly as large as the friction is held, beside one across it.
+TEST(SupportSharesTest, AForceAtTheLimitIsHeld) {
+  for (const Stepping stepping : {Stepping::kEvent, Stepping::kFixed}) {
+    for (const char* support :
+         {R"({"friction": 0.2, "load": 10})", R"({"friction": 0.2, "load": 10, "radius": 0.1})"}) {
+      for (const char* force : {"[2, 5]", "[2, 0.1]", "[-2, 0]"}) {
+        Scene scene = OnARail(support, "[1, 0]", force, stepping);
+        scene.simulation.dt = 0.05;
+        const GradientResult result = Jacobian(scene, {"bodies/b/mass"}, GradientMethod::kTangent);
+        ASSERT_TRUE(result.done) << result.message;
+        EXPECT_NEAR(result.values[0], 0.3, 1e-15) << support << force;
+      }
+    }
+  }
+}
+
+// An arm whose two points are in line with its pivot: both slide across the arm, also where a body
+// alone would turn about its centre. Torque 1 N m of friction, for all masses and steps.
+TEST(SupportSharesTest, AnArmOnPointsInLineWithItsPivot) {
+  for (const double mass : {0.5, 1.0, 1.001, 1.5}) {
+    for (const double dt : {0.1, 0.05, 0.02, 0.01}) {
+      for (const double torque : {0.95, 1.05, 1.2}) {
+        Scene scene = SceneOf(R"({"gravity": [0, 0], "bodies": [
+            {"name": "b", "mass": 1, "inertia": 0.01, "position": [0.5, 0],
+             "support": {"friction": 0.2, "load": 10, "points": [[0.1, 0], [-0.1, 0]]}}],
+            "joints": [{"name": "j", "type": "revolute", "bodies": ["b", "world"],
+                        "anchor": [0, 0]}],
+            "forces": [{"name": "f", "body": "b", "torque": 1}],
+            "simulation": {"dt": 0.1, "duration": 0.2, "joint_correction": "projection"}})");
+        scene.bodies[0].mass = mass;
+        scene.simulation.dt = dt;
+        scene.forces[0].torque = torque;
+        const GradientResult result =
+            Jacobian(scene, {"forces/f/torque"}, GradientMethod::kTangent);
+        ASSERT_TRUE(result.done) << result.message;
+        const double rate = torque > 1.0 ? 0.2 * (torque - 1.0) / (0.01 + 0.25 * mass) : 0.0;
+        EXPECT_NEAR(result.values[5], rate, 1e-3 * rate + 1e-12) << mass << " " << dt;
+      }
+    }
+  }
+}
+
+// A body that turns about its support is not at rest, though the support is: the friction of a
+// hinge slows it down, angle w^2 I / (2 tau).
+TEST(SupportSharesTest, FrictionOfAHingeSlowsABodyThatTurnsAboutItsSupport) {
+  for (const char* support : {R"({"friction": 0.2})", R"({"friction": 0.2, "points": [[0, 0]]})"}) {
+    const Scene scene = SceneOf(std::string(R"({"gravity": [0, 0], "bodies": [
+        {"name": "b", "mass": 1, "inertia": 0.01, "position": [0, 0], "support": )") +
+                                support + R"(}],
+        "joints": [{"name": "j", "type": "revolute", "bodies": ["b", "world"], "anchor": [0, 0],
+                    "rate": 1, "friction": 0.02}],
+        "simulation": {"dt": 0.02, "duration": 1, "stepping": "event"}})");
+    const std::vector<std::string> paths = {"joints/j/rate", "joints/j/friction"};
+    const GradientResult result = Jacobian(scene, paths, GradientMethod::kTangent);
+    ASSERT_TRUE(result.done) << result.message;
+    EXPECT_NEAR(result.values[2], 0.25, 1e-9) << support;
+    EXPECT_NEAR(result.jacobian(2, 0), 0.5, 1e-7) << support;
+    EXPECT_NEAR(result.jacobian(2, 1), -12.5, 1e-6) << support;
+  }
+}
+
+}  // namespace
+}  // namespace tangible
