@@ -260,8 +260,8 @@ void SupportIteration::GoOnWithDampers(const Model<double>& model,
             SupportState& at = before->supports[k];
             const size_t first = std::exchange(part, part + NumParts());
             if (!(friction_.limit() > 0.0)) return;
-            ratios_.resize(part);
-            last_ratios_.resize(part);
+            if (ratios_.size() < part) ratios_.resize(part);
+            if (last_ratios_.size() < part) last_ratios_.resize(part);
             for (size_t i = first; i < part; ++i) {
               ratios_[i] = begins ? 0.0 : RatioOf(at, i - first, twist);
             }

@@ -16,11 +16,9 @@
 // would not choose, friction becomes dampers for a number of solves, of which each solution is the
 // next û (the majorisation of Weiszfeld, with a smoothing that vanishes): they approach the
 // solution without leaving it again, slowly, and tell by |v⁺| / |û|, which is |f| / (μ N), what is
-// held.
-// Newton's method goes on from there, and after that more dampers. Of bodies that are held together
-// the shares are not determined, and those of the solve may exceed what one can give where others
-// could give more: the dampers have found shares with which all are held.
-// A body of given
+// held. Newton's method goes on from there, and after that more dampers. Of bodies that are held
+// together the shares are not determined, and those of the solve may exceed what one can give where
+// others could give more: the dampers have found shares with which all are held. A body of given
 // motion may push others however large their friction: where a problem has no solution with what is
 // held, all of it is let go, and û is the twist that the others then give it.
 

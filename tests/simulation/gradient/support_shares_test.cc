@@ -159,6 +159,27 @@ TEST(SupportSharesTest, BodiesHoldTogetherWhatOneCannot) {
   }
 }
 
+// An arm of two links comes to rest with friction of both hinges, a motor and two supports: the
+// dampers have to tell of the second support too what it holds.
+TEST(SupportSharesTest, BothLinksOfAnArmComeToRest) {
+  const Scene scene = SceneOf(R"({"gravity": [0, 0], "bodies": [
+      {"name": "a", "mass": 0.2, "inertia": 0.02, "position": [0.3, 0],
+       "support": {"friction": 0.3,
+                   "points": [[0.1, 0.1], [-0.1, 0.1], [-0.1, -0.1], [0.1, -0.1]]}},
+      {"name": "b", "mass": 2, "inertia": 0.02, "position": [0.9, 0],
+       "support": {"friction": 0.3}}],
+      "joints": [
+        {"name": "j", "type": "revolute", "bodies": ["a", "world"], "anchor": [0, 0],
+         "friction": 0.05, "stiffness": 5},
+        {"name": "k", "type": "revolute", "bodies": ["b", "a"], "anchor": [0.6, 0],
+         "rate": 0.5, "friction": 0.05, "motor": {"speed": 0, "limit": 0.1}}],
+      "forces": [{"name": "f", "body": "b", "force": [0.5, 1]}],
+      "simulation": {"dt": 1e-4, "duration": 0.08}})");
+  const GradientResult result = Jacobian(scene, {"joints/k/rate"}, GradientMethod::kTangent);
+  ASSERT_TRUE(result.done) << result.message;
+  for (const int i : {3, 4, 5, 9, 10, 11}) EXPECT_NEAR(result.values[i], 0.0, 1e-15) << i;
+}
+
 // A force along the rail that is exactly as large as the friction is held, beside one across it.
 TEST(SupportSharesTest, AForceAtTheLimitIsHeld) {
   for (const Stepping stepping : {Stepping::kEvent, Stepping::kFixed}) {
