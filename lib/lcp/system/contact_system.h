@@ -198,7 +198,7 @@ class ContactSystem {
   int num_blocks_ = 0;
   int first_contact_edge_ = 0;
   bool regularised_ = false;
-  double give_ = 1.0;  ///< LargestGive
+  double give_ = 1.0;           ///< LargestGive
   bool masses_differ_ = false;  // so much that solves are refined
   bool condensed_ = false;
   int expansions_ = 0;
