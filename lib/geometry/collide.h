@@ -38,6 +38,10 @@ struct ContactFeature {
   /// The number of places of a spline, whose edge is one of them; 0: no spline's edge. A contact
   /// moves along them (FeatureAt), and is the same as one at the next place.
   int places = 0;
+  /// Whether the contact's point is that of the vertex and not midway between the surfaces, for a
+  /// vertex without a radius against a line. Of two contacts that hold one vertex, points midway
+  /// would be two of one body, so that nearly equal rows would contradict each other.
+  bool is_at_vertex = false;
   /// a and b, or 0 for the place of a contact along a spline.
   int FixedA() const { return places > 0 && kind == FeatureKind::kEdgeVertex ? 0 : a; }
   int FixedB() const { return places > 0 && kind == FeatureKind::kVertexEdge ? 0 : b; }

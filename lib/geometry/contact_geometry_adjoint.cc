@@ -110,17 +110,18 @@ void HalfPlaneLineAdjoint(const ShapeView<double>& shape, const FlatLine& bar,
 // This returns the adjoint of the line.
 FlatLine VertexAgainstLineAdjoint(const ShapeView<double>& shape, const Pose<double>& pose,
                                   int vertex, const FlatLine& line, const Pose<double>& line_pose,
-                                  const ContactGeometry<double>& bar, ContactSideAdjoint* side,
-                                  ContactSideAdjoint* line_side) {
+                                  bool is_at_vertex, const ContactGeometry<double>& bar,
+                                  ContactSideAdjoint* side, ContactSideAdjoint* line_side) {
   const Vector arm = pose.rotation * Vertex(shape, vertex);
   const Vector relative(pose.position.x() - line_pose.position.x() + arm.x(),
                         pose.position.y() - line_pose.position.y() + arm.y());
   const Vector normal = line_pose.rotation * line.normal;
   const double radius = CoreRadius(shape);
   const double gap = Dot(normal, relative) - line.offset - radius - line.radius;
-  const double depth = radius + 0.5 * gap;
+  const double of_gap = is_at_vertex ? 0.0 : 0.5;
+  const double depth = radius + of_gap * gap;
   const double depth_bar = -Dot(normal, bar.point);
-  const double gap_bar = bar.gap + 0.5 * depth_bar;
+  const double gap_bar = bar.gap + of_gap * depth_bar;
   const Vector normal_bar(bar.normal.x() - depth * bar.point.x() + gap_bar * relative.x(),
                           bar.normal.y() - depth * bar.point.y() + gap_bar * relative.y());
   const Vector relative_bar(gap_bar * normal.x(), gap_bar * normal.y());
@@ -253,34 +254,36 @@ void EvaluateContactAdjoint(const ContactFeature& feature, const ShapeView<doubl
   switch (feature.kind) {
     case FeatureKind::kVertexEdge: {
       const FlatLine line = internal::EdgeLine(shape_b, feature.b);
-      EdgeLineAdjoint(
-          shape_b, feature.b,
-          VertexAgainstLineAdjoint(shape_a, pose_a, feature.a, line, pose_b, bar, a_bar, b_bar),
-          b_bar);
+      EdgeLineAdjoint(shape_b, feature.b,
+                      VertexAgainstLineAdjoint(shape_a, pose_a, feature.a, line, pose_b,
+                                               feature.is_at_vertex, bar, a_bar, b_bar),
+                      b_bar);
       break;
     }
     case FeatureKind::kEdgeVertex: {
       const FlatLine line = internal::EdgeLine(shape_a, feature.a);
-      EdgeLineAdjoint(shape_a, feature.a,
-                      VertexAgainstLineAdjoint(shape_b, pose_b, feature.b, line, pose_a,
-                                               internal::Swapped(bar), b_bar, a_bar),
-                      a_bar);
+      EdgeLineAdjoint(
+          shape_a, feature.a,
+          VertexAgainstLineAdjoint(shape_b, pose_b, feature.b, line, pose_a, feature.is_at_vertex,
+                                   internal::Swapped(bar), b_bar, a_bar),
+          a_bar);
       break;
     }
     case FeatureKind::kVertexPlane: {
       const FlatLine line = internal::HalfPlaneLine(shape_b);
-      HalfPlaneLineAdjoint(
-          shape_b,
-          VertexAgainstLineAdjoint(shape_a, pose_a, feature.a, line, pose_b, bar, a_bar, b_bar),
-          b_bar);
+      HalfPlaneLineAdjoint(shape_b,
+                           VertexAgainstLineAdjoint(shape_a, pose_a, feature.a, line, pose_b,
+                                                    feature.is_at_vertex, bar, a_bar, b_bar),
+                           b_bar);
       break;
     }
     case FeatureKind::kPlaneVertex: {
       const FlatLine line = internal::HalfPlaneLine(shape_a);
-      HalfPlaneLineAdjoint(shape_a,
-                           VertexAgainstLineAdjoint(shape_b, pose_b, feature.b, line, pose_a,
-                                                    internal::Swapped(bar), b_bar, a_bar),
-                           a_bar);
+      HalfPlaneLineAdjoint(
+          shape_a,
+          VertexAgainstLineAdjoint(shape_b, pose_b, feature.b, line, pose_a, feature.is_at_vertex,
+                                   internal::Swapped(bar), b_bar, a_bar),
+          a_bar);
       break;
     }
     case FeatureKind::kVertexVertex:

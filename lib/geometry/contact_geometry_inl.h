@@ -70,9 +70,11 @@ BoundaryLine<T> HalfPlaneLine(const ShapeView<T>& shape) {
 }
 
 /// A vertex of `shape` against a line of the body at `line_pose`; the normal points to the vertex.
+/// `is_at_vertex`: ContactFeature's.
 template <typename T>
 ContactGeometry<T> VertexAgainstLine(const ShapeView<T>& shape, const Pose<T>& pose, int vertex,
-                                     const BoundaryLine<T>& line, const Pose<T>& line_pose) {
+                                     const BoundaryLine<T>& line, const Pose<T>& line_pose,
+                                     bool is_at_vertex) {
   // The position of the body is subtracted first, so that little is lost to rounding far from the
   // origin.
   const Vector2<T> arm = pose.rotation * Vertex(shape, vertex);
@@ -84,7 +86,7 @@ ContactGeometry<T> VertexAgainstLine(const ShapeView<T>& shape, const Pose<T>& p
   result.normal = normal;
   result.gap =
       normal.x() * relative.x() + normal.y() * relative.y() - line.offset - radius - line.radius;
-  const T depth = radius + 0.5 * result.gap;
+  const T depth = is_at_vertex ? radius : T(radius + 0.5 * result.gap);
   result.point = Vector2<T>(pose.position.x() + arm.x() - normal.x() * depth,
                             pose.position.y() + arm.y() - normal.y() * depth);
   return result;
@@ -202,14 +204,17 @@ ContactGeometry<T> EvaluateContact(const ContactFeature& feature, const ShapeVie
   }
   switch (feature.kind) {
     case FeatureKind::kVertexEdge:
-      return VertexAgainstLine(shape_a, pose_a, feature.a, EdgeLine(shape_b, feature.b), pose_b);
+      return VertexAgainstLine(shape_a, pose_a, feature.a, EdgeLine(shape_b, feature.b), pose_b,
+                               feature.is_at_vertex);
     case FeatureKind::kEdgeVertex:
-      return Swapped(
-          VertexAgainstLine(shape_b, pose_b, feature.b, EdgeLine(shape_a, feature.a), pose_a));
+      return Swapped(VertexAgainstLine(shape_b, pose_b, feature.b, EdgeLine(shape_a, feature.a),
+                                       pose_a, feature.is_at_vertex));
     case FeatureKind::kVertexPlane:
-      return VertexAgainstLine(shape_a, pose_a, feature.a, HalfPlaneLine(shape_b), pose_b);
+      return VertexAgainstLine(shape_a, pose_a, feature.a, HalfPlaneLine(shape_b), pose_b,
+                               feature.is_at_vertex);
     case FeatureKind::kPlaneVertex:
-      return Swapped(VertexAgainstLine(shape_b, pose_b, feature.b, HalfPlaneLine(shape_a), pose_a));
+      return Swapped(VertexAgainstLine(shape_b, pose_b, feature.b, HalfPlaneLine(shape_a), pose_a,
+                                       feature.is_at_vertex));
     case FeatureKind::kVertexVertex:
     default:
       return VertexAgainstVertex(feature, shape_a, pose_a, shape_b, pose_b);

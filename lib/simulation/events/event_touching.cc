@@ -73,6 +73,33 @@ void KeepOneOwner(const Model<double>& model, const State<double>& state, const 
   }
 }
 
+// A vertex that several contacts hold is one point for all of them (ContactFeature::is_at_vertex).
+void MarkSharedVertices(const Model<double>& model, std::vector<ActiveContact>* contacts) {
+  struct Corner {
+    int body = -1, part = 0, vertex = 0;
+    bool operator==(const Corner&) const = default;
+  };
+  const auto corner_of = [&](const ActiveContact& contact) {
+    const ContactFeature& feature = contact.feature;
+    const bool is_first =
+        feature.kind == FeatureKind::kVertexEdge || feature.kind == FeatureKind::kVertexPlane;
+    if (!contact.IsOfShapes() || feature.kind == FeatureKind::kVertexVertex ||
+        IsRound(is_first ? ShapeOfA(model, contact) : ShapeOfB(model, contact))) {
+      return Corner{};
+    }
+    return is_first ? Corner{contact.a, feature.part_a, feature.a}
+                    : Corner{contact.b, feature.part_b, feature.b};
+  };
+  for (size_t i = 1; i < contacts->size(); ++i) {
+    const Corner corner = corner_of((*contacts)[i]);
+    if (corner.body < 0) continue;
+    for (size_t k = 0; k < i; ++k) {
+      if (!(corner_of((*contacts)[k]) == corner)) continue;
+      (*contacts)[i].feature.is_at_vertex = (*contacts)[k].feature.is_at_vertex = true;
+    }
+  }
+}
+
 }  // namespace
 
 void EventStepper::FindTouching(const Model<double>& model, const State<double>& state) {
@@ -120,6 +147,7 @@ void EventStepper::FindTouching(const Model<double>& model, const State<double>&
   for (const ActiveContact& contact : found) {
     AddTouching(model, state, contact);
   }
+  MarkSharedVertices(model, &touching_.contacts);
 }
 
 int EventStepper::StuckLimit(const Model<double>& model, const State<double>& state, double moved) {

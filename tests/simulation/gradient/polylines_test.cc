@@ -212,6 +212,30 @@ TEST(PolylineTest, DerivativesOfAllMethodsAgree) {
   }
 }
 
+// A box slides into a slope of 45 degrees, which catches its corner: the corner stays where floor and
+// slope meet, and the box turns about it with what is left of its angular momentum.
+TEST(PolylineTest, ACornerThatIsCaughtInAValleyIsAPivot) {
+  const char ground[] = R"("polyline": {"points": [[-2, 0], [0, 0], [1, 1]], "solid": "right"})";
+  const Scene scene =
+      On(R"("shape": {"box": {"size": [0.2, 0.2]}}, "position": [-0.5, 0.1], "velocity": [2, 0])",
+         ground, "event", 0.28, 0.3);
+  const RolledOnPolyline run = RollOnPolyline(scene);
+  const double slid = std::sqrt(4.0 - 2.0 * 0.3 * kGravity * 0.4);
+  const double about_corner = 0.02 + 0.04 / 6.0;  // m², by the mass
+  const double turned = 0.1 * slid / about_corner;
+  const double angle = run.final.pose[2];
+  const double sine = std::sin(angle);
+  const double cosine = std::cos(angle);
+  EXPECT_NEAR(run.final.pose[0], -0.1 * cosine - 0.1 * sine, 1e-9);
+  EXPECT_NEAR(run.final.pose[1], -0.1 * sine + 0.1 * cosine, 1e-9);
+  EXPECT_NEAR(
+      run.final.twist[2],
+      -std::sqrt(turned * turned - 2.0 * kGravity * (run.final.pose[1] - 0.1) / about_corner),
+      1e-8);
+  ExpectAllAgree(scene, {"bodies/b/position/x", "bodies/b/shape/size/x", "bodies/b/friction",
+                         "bodies/ground/shape/points/1/x"});
+}
+
 // The first point of a closed outline, which its last edge reads too.
 TEST(PolylineTest, DerivativesByPointsOfAClosedOutline) {
   const char room[] = R"("polyline": {"points": [[0.3, -0.2], [2, 1.5], [0, 2], [-1.5, 1]],
