@@ -49,14 +49,27 @@ double StepTangent::ApplyAndMeasure(const Model<double>& model, Stepper* stepper
   const auto measure = [&](int c, const ContactProblem<double>& problem,
                            const std::vector<int>& block_of, const SolveDerivative::Rates& rates) {
     double impulse = 0.0;
+    const auto add = [&](Eigen::Index row, double mobility) {
+      impulse = std::max(impulse, mobility * std::abs(rates(row, c)));
+    };
     for (size_t i = 0; i < problem.contacts.size(); ++i) {
       if (block_of[i] < 0) continue;
       const ContactBlock<double>& contact = problem.contacts[i];
-      const double mobility =
-          RowMobility(problem.mass, contact.a, contact.normal_a, contact.b, contact.normal_b);
       const Eigen::Index row = 3 * static_cast<Eigen::Index>(block_of[i]);
-      impulse = std::max(
-          {impulse, mobility * std::abs(rates(row, c)), mobility * std::abs(rates(row + 1, c))});
+      const double normal =
+          RowMobility(problem.mass, contact.a, contact.normal_a, contact.b, contact.normal_b);
+      const double tangent =
+          RowMobility(problem.mass, contact.a, contact.tangent_a, contact.b, contact.tangent_b);
+      add(row, normal);
+      // Friction in a joint, and a motor, have no normal row.
+      add(row + 1, normal > 0.0 ? normal : tangent);
+    }
+    for (size_t j = 0; j < problem.joints.size(); ++j) {
+      const JointBlock<double>& joint = problem.joints[j];
+      for (int k = 0; k < joint.rows; ++k) {
+        add(3 * (problem.num_bodies + static_cast<Eigen::Index>(j)) + k,
+            RowMobility(problem.mass, joint.a, joint.row_a[k], joint.b, joint.row_b[k]));
+      }
     }
     for (size_t row = 0; row < problem.mass.size(); ++row) {
       driven[c] = std::max(driven[c], std::abs(rates(static_cast<Eigen::Index>(row), c)));

@@ -313,7 +313,7 @@ double EventDerivative::Tangent(const Model<double>& model, EventRecord* record,
       residual = std::max(residual, EventGradient(model, &segment, &gradient));
       const Row g_dot = gradient.transpose() * x;
       const double terms = gradient.cwiseAbs().dot(x.col(columns).cwiseAbs());
-      if (std::abs(g_dot(columns)) > kNoRate * terms) {
+      if (segment.HasRate(g_dot(columns), terms)) {
         tau_dot = -g_dot / g_dot(columns);
       }
     } else if (!segment.IsEventAtOnce()) {
@@ -412,7 +412,7 @@ void EventDerivative::SegmentAdjoint(const Model<double>& model, Segment* segmen
     EventGradient(model, segment, &gradient);
     const double rate = gradient.dot(by_length.col(0));
     const double terms = gradient.cwiseAbs().dot(by_length.col(0).cwiseAbs());
-    if (std::abs(rate) > kNoRate * terms) {
+    if (segment->HasRate(rate, terms)) {
       *w_bar -= gradient * (alpha / rate);
     }
   } else if (!segment->IsEventAtOnce()) {

@@ -56,7 +56,7 @@ class EventReplay {
              const ContactSolution<double>& solution, const std::vector<double>& signs,
              ContactSystem* system, ContactSolution<T>* out) {
     if (route_ == JetRoute::kUnrolled) {
-      ModeElimination<T>::Solve(problem, solution.modes, out);
+      ModeElimination<T>::Solve(problem, solution.modes, signs, out);
       return;
     }
     SolveImplicitly(problem, in_double, solution, signs, system, out);
@@ -313,9 +313,7 @@ class EventReplay {
                    State<T>* after) {
     const Rate rate = RateOf(segment);
     Map(segment, before, now, *tau, after);
-    if (!(std::abs(rate.value) > kNoRate * rate.terms)) {
-      return;
-    }
+    if (!segment->HasRate(rate.value, rate.terms)) return;
     using Derivatives = Eigen::Array<double, kWidth, 1>;
     Derivatives first;
     double last = HUGE_VAL;

@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/simulation/events/event_record.h"
 
+#include <algorithm>
+#include <cmath>
+
+#include "tangible/simulation/events/tolerances.h"
+
 namespace tangible {
 namespace {
 
@@ -42,6 +47,19 @@ EventPart* EventRecord::Add() {
     parts.push_back(std::make_unique<EventPart>());
   }
   return parts[num_parts++].get();
+}
+
+bool Segment::HasRate(double rate, double terms) const {
+  double least = kNoRate * terms;
+  if (event == EventKind::kTouch && event_contact.IsOfShapes()) {
+    double fastest = 0.0;
+    for (const int body : {event_contact.a, event_contact.b}) {
+      const double* const twist = &after.twist[3 * static_cast<size_t>(body)];
+      fastest = std::max({fastest, std::abs(twist[0]), std::abs(twist[1])});
+    }
+    least = std::max(least, kTouchRounding * fastest);
+  }
+  return std::abs(rate) > least;
 }
 
 size_t EventRecord::bytes() const {

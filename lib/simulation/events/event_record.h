@@ -140,6 +140,9 @@ struct Segment {
   /// Whether the event's time is the segment's start.
   bool IsEventAtOnce() const { return event == EventKind::kAtOnce || at_once; }
 
+  /// Whether the event's equation changes with the segment's length, by `rate`, and not by rounding
+  /// alone. `terms`: the sum of the magnitudes of the terms of the rate.
+  bool HasRate(double rate, double terms) const;
   /// Whether contact i sticks between the bodies of contact k, as k does. Such contacts, the two
   /// ends of a face, begin to slide together, when the sum of their friction reaches the sum of its
   /// limits: the share of each is not determined, and nothing moves before.

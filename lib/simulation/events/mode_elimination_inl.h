@@ -22,9 +22,10 @@ template <typename T>
 class ModeElimination {
  public:
   /// Solves the problem with the given modes of its contacts, for bodies, normal impulses, and the
-  /// tangential impulses of contacts that stick. Cost: the cube of the number of rows.
+  /// tangential impulses of contacts that stick. `signs`: σ of the others in λt = −σ μ λn. Cost: the
+  /// cube of the number of rows.
   static void Solve(const ContactProblem<T>& p, const std::vector<ContactMode>& modes,
-                    ContactSolution<T>* out) {
+                    const std::vector<double>& signs, ContactSolution<T>* out) {
     int size = 3 * p.num_bodies;
     for (const JointBlock<T>& joint : p.joints) {
       size += joint.rows;
@@ -56,13 +57,13 @@ class ModeElimination {
         }
       }
     }
-    const MatrixX<T> exact = System(p, modes, 0.0, row_of, size);
+    const MatrixX<T> exact = System(p, modes, signs, 0.0, row_of, size);
     DenseLu<T> lu;
     VectorX<T> x;
     if (lu.Compute(exact) && lu.pivot_ratio() > kSingularPivot) {
       x = lu.Solve(rhs);
     } else {
-      lu.Compute(System(p, modes, kContactRegularisation, row_of, size));
+      lu.Compute(System(p, modes, signs, kContactRegularisation, row_of, size));
       x = lu.Solve(rhs);
       for (int k = 0; k < internal::kEliminationRefinements; ++k) {
         VectorX<T> left(size);
@@ -101,7 +102,8 @@ class ModeElimination {
  private:
   // The mode system as a dense matrix; δ > 0 on its constraints' diagonal.
   static MatrixX<T> System(const ContactProblem<T>& p, const std::vector<ContactMode>& modes,
-                           double delta, const std::vector<int>& row_of, int size) {
+                           const std::vector<double>& signs, double delta,
+                           const std::vector<int>& row_of, int size) {
     MatrixX<T> k = MatrixX<T>::Constant(size, size, T(0.0));
     const int bodies = 3 * p.num_bodies;
     for (int i = 0; i < bodies; ++i) {
@@ -155,7 +157,7 @@ class ModeElimination {
       } else {
         // A torque at its limit follows the normal impulse of the contact before it.
         add_force(c.rolls ? row_of[i - 1] : at, c.a, c.tangent_a, c.b, c.tangent_b,
-                  T(-SlidingSign(modes[i]) * c.friction));
+                  T(-signs[i] * c.friction));
       }
     }
     return k;

@@ -183,6 +183,9 @@ inline constexpr double kAlignedRadii = 8.0 * kAligned;
 /// segment's length, is rounding: a contact changes from one feature to another, and nothing
 /// depends on the time.
 inline constexpr double kNoRate = 1e-9;
+/// Of the speeds of the two bodies: a gap that closes more slowly, as where a body passes from one
+/// of two flush faces to the other one, is rounding in the same way.
+inline constexpr double kTouchRounding = 1e-13;
 /// Of the largest pivot: smaller pivots belong to redundant rows, which elimination leaves at some
 /// thousand ε; division by them would turn rounding into derivatives, so that
 /// δ = `kContactRegularisation` is added.

@@ -290,5 +290,35 @@ TEST(OutlineSeamsTest, WhatPassesBelowAShelfStaysBelow) {
   }
 }
 
+// The time at which a foot passes from one face to the other one is no event's: the gap to the next
+// face closes with rounding alone. Without friction its derivative is that of a growing one.
+TEST(OutlineSeamsTest, NothingDependsOnTheTimeOfPassingAJoint) {
+  for (const double friction : {0.3, 0.0}) {
+    for (const double start : {-0.3, -0.4, -0.5}) {
+      SCOPED_TRACE(test_scenes::Text(friction) + " " + test_scenes::Text(start));
+      const std::string law = R"("friction": )" + test_scenes::Text(friction);
+      const Scene scene = test_scenes::SceneOf(
+          R"({"bodies": [{"name": "m", "mass": 1, )" + law +
+          R"(, "shape": {"capsule": {"length": 0.3, "radius": 0.2}}, "velocity": [2.5, 0],
+              "position": [)" +
+          test_scenes::Text(start) + R"(, 0.2]},
+             {"name": "a", "static": true, )" +
+          law +
+          R"(, "shape": {"box": {"size": [1, 1]}}, "position": [-0.5, -0.5]},
+             {"name": "b", "static": true, )" +
+          law +
+          R"(, "shape": {"box": {"size": [1, 1]}}, "position": [0.5, -0.5]}],
+             "simulation": {"stepping": "event", "dt": 0.01, "duration": 0.3}})");
+      const std::vector<std::string> paths = {"bodies/m/shape/length", "bodies/m/friction",
+                                              "bodies/m/velocity/x", "bodies/b/position/x"};
+      const GradientResult adjoint = testing::Jacobian(scene, paths, GradientMethod::kAdjoint);
+      testing::ExpectOthersAgree(scene, paths, adjoint);
+      // x = v T - mu g T² / 2, mu the mean of both bodies'
+      EXPECT_NEAR(adjoint.jacobian(0, 0), 0.0, 1e-9);
+      EXPECT_NEAR(adjoint.jacobian(0, 1), -0.25 * test_scenes::kGravity * 0.09, 1e-9);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace tangible
