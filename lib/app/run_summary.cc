@@ -7,6 +7,7 @@
 #include <string>
 
 #include "tangible/dynamics/assembly/assembly.h"
+#include "tangible/dynamics/model/model_releases.h"
 #include "tangible/lcp/system/contact_conditioning.h"
 #include "tangible/simulation/stepping/invariants.h"
 
@@ -122,6 +123,7 @@ void RunSummary::Keep(const Model<double>& model, const State<double>& state,
   }
   if (!model.structure->joints.empty() || RunsByEvents(model)) {
     poses_.insert(poses_.end(), state.pose.begin(), state.pose.end());
+    times_.push_back(stepper == nullptr ? 0.0 : stepper->record().time + stepper->record().h);
   }
   if (stepper != nullptr) {
     const StepRecord& record = stepper->record();
@@ -149,8 +151,11 @@ bool RunSummary::IsFull() const {
 void RunSummary::EvaluateKept(const Model<double>& model) {
   const ModelStructure& structure = *model.structure;
   const auto size = static_cast<std::ptrdiff_t>(first_.pose.size());
-  for (auto pose = poses_.cbegin(); pose != poses_.cend(); pose += size) {
+  auto time = times_.cbegin();
+  for (auto pose = poses_.cbegin(); pose != poses_.cend(); pose += size, ++time) {
     at_.pose.assign(pose, pose + size);
+    // What a joint let go has no drift.
+    SetReleased(model, *time, &at_);
     joint_drift_max_ = std::max(joint_drift_max_, JointDrift(model, at_));
     if (RunsByEvents(model)) {
       penetration_max_ = std::max(penetration_max_, DeepestPenetration(model, at_));
@@ -163,6 +168,7 @@ void RunSummary::EvaluateKept(const Model<double>& model) {
     begin = end;
   }
   poses_.clear();
+  times_.clear();
   closed_.clear();
   closed_ends_.clear();
 }

@@ -36,6 +36,7 @@ class RunSummary {
   // The kept data: the poses of states one after the other, where the scene has joints or runs by
   // events, and for each step the bodies in contact and the position in `closed_` where they end.
   std::vector<double> poses_;
+  std::vector<double> times_;  // of the poses
   std::vector<std::pair<int, int>> closed_;
   std::vector<size_t> closed_ends_;
   State<double> at_;  // the state whose joints and gaps are measured

@@ -28,6 +28,22 @@ class GradientVisitor : private internal::LocalEntries<EntryListSink> {
     Emit(locals, 0, rows.geometry.gap);
   }
 
+  void Passing(const ActiveContact& lost, const ActiveContact& next) {
+    Locals of_lost, of_next;
+    ContactRows<LocalJet> rows_of_lost, rows_of_next;
+    LocalContactRows(lost, &of_lost, &rows_of_lost);
+    LocalContactRows(next, &of_next, &rows_of_next);
+    const ContactGeometry<LocalJet>& x = rows_of_lost.geometry;
+    const ContactGeometry<LocalJet>& y = rows_of_next.geometry;
+    // The variables of one contact at a time: the other one's values alone.
+    const auto values = [](ContactGeometry<LocalJet> geometry) {
+      geometry.normal = {LocalJet(geometry.normal.x().a), LocalJet(geometry.normal.y().a)};
+      return geometry;
+    };
+    Emit(of_lost, 0, SineBetween(x, values(y)));
+    Emit(of_next, 0, SineBetween(values(x), y));
+  }
+
   void Slip(const ActiveContact& contact) {
     Locals locals;
     if (contact.is_rolling) {
@@ -214,6 +230,13 @@ void AddGapGradient(const Model<double>& model, const State<double>& state,
                     std::vector<JacobianEntry>* entries) {
   const EntryListSink sink{entries};
   GradientVisitor(model, state, scratch, sink).Gap(contact);
+}
+
+void AddPassingGradient(const Model<double>& model, const State<double>& state,
+                        const ActiveContact& lost, const ActiveContact& next,
+                        LocalJacobianScratch* scratch, std::vector<JacobianEntry>* entries) {
+  const EntryListSink sink{entries};
+  GradientVisitor(model, state, scratch, sink).Passing(lost, next);
 }
 
 void AddSlipGradient(const Model<double>& model, const State<double>& state,

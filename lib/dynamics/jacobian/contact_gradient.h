@@ -8,6 +8,18 @@
 
 namespace tangible {
 
+/// The sine of the angle between the normals of two contacts of a pair: 0 where the foot of a
+/// rounded corner passes from an edge to a corner at its end, or back.
+template <typename T>
+T SineBetween(const ContactGeometry<T>& lost, const ContactGeometry<T>& next) {
+  return Cross(lost.normal, next.normal);
+}
+
+/// Emits the entries of SineBetween.
+void AddPassingGradient(const Model<double>& model, const State<double>& state,
+                        const ActiveContact& lost, const ActiveContact& next,
+                        LocalJacobianScratch* scratch, std::vector<JacobianEntry>* entries);
+
 /// Emits the entries (row 0, variable, value) of the gap of a contact or limit, m or rad.
 void AddGapGradient(const Model<double>& model, const State<double>& state,
                     const ActiveContact& contact, LocalJacobianScratch* scratch,

@@ -109,6 +109,7 @@ class RolloutCertifier {
   void AddSplits(const Model<double>& model, long step, const Segment& segment);
   void AddImpact(const Model<double>& model, long step, Impulses* impact);
   void AddOtherSlips(const Model<double>& model, const Segment& segment, const Place& place);
+  void KeepEndsOfSlips(const Model<double>& model, const Segment& segment);
   void AddJumpsOfLoads(const Model<double>& model, const Segment& segment, const Place& place);
   void AddBesideJumps(const Model<double>& model, const Segment& segment);
   void AddEventOf(const Model<double>& model, long step, EventDerivative* derivative,
@@ -136,6 +137,7 @@ class RolloutCertifier {
                          const std::vector<size_t>& approaching) const;
   Coupling CouplingWithStrikes(const Model<double>& model, const Impulses& impact) const;
   void AddStrikes(const ModelStructure& s, const Impulses& impact);
+  void AddEndsOfSlips(const Model<double>& model, long step, const Impulses& impact);
   void AddContact(const Model<double>& model, const StepRecord& record, const ContactScales& scales,
                   const Place& place);
   void AddLaw(const Model<double>& model, const StepRecord& record, const Place& place);
@@ -179,6 +181,7 @@ class RolloutCertifier {
     double time = 0.0;
   };
   std::vector<Strike> strikes_;       ///< of the last impact, and of those shortly before it
+  std::vector<Strike> slips_ended_;   ///< of the last instant at which contacts stopped sliding
   const Impulses* impact_ = nullptr;  ///< the last one in a step, until the motion that follows it
   const Segment* start_ = nullptr;  ///< the instant at which the run starts, until the first motion
   /// A located event near a step's end, of contacts of the whole model.

@@ -8,11 +8,13 @@
 #include <limits>
 
 #include "tangible/dynamics/jacobian/contact_gradient.h"
+#include "tangible/dynamics/model/driven_bodies.h"
 #include "tangible/dynamics/model/lengths.h"
 #include "tangible/lcp/system/contact_conditioning.h"
 #include "tangible/simulation/certificate/certify_grazing.h"
 #include "tangible/simulation/certificate/certify_place_inl.h"
 #include "tangible/simulation/certificate/feature_ties.h"
+#include "tangible/simulation/certificate/segment_share.h"
 #include "tangible/simulation/certificate/split_error.h"
 #include "tangible/simulation/certificate/support_slacks.h"
 #include "tangible/simulation/certificate/tolerances.h"
@@ -56,6 +58,25 @@ bool BeginsInPenetration(const Model<double>& model, const Segment& segment) {
 double SlipOf(const Model<double>& model, const State<double>& state,
               const ActiveContact& contact) {
   return std::abs(SpeedsOf(model, state, contact).slip);
+}
+
+// Whether it matters for the speeds after an impact whether it comes before the jump of the speed
+// of a body on a path or behind it: not if the jump makes an inelastic impact again, or anew.
+bool StrikesBeforeOrBehind(const Model<double>& model, const Segment& segment,
+                           const LoadJump& jump) {
+  const ActiveContact& contact = segment.event_contact;
+  if (!contact.IsOfShapes() || (jump.driven != contact.a && jump.driven != contact.b)) return false;
+  const double time = segment.time + segment.length;
+  const auto approach = [&](double inside) {
+    State<double> state = segment.after;
+    FollowPaths(model, time, inside, &state);
+    return -SpeedsOf(model, state, contact).normal;
+  };
+  const double before = approach(JustBefore(model, time));
+  const double behind = approach(JustAfter(model, time));
+  const double apart = before - behind;
+  return std::abs(apart) > Negligible(model, before) &&
+         (apart > 0.0 || RestitutionOf(model, contact).value > 0.0);
 }
 
 // Whether a contact at rest is accelerated in its direction of sliding as a motion starts, by more
@@ -123,6 +144,7 @@ void RolloutCertifier::AddImpact(const Model<double>& model, long step, Impulses
   }
   if (is_first) {
     AddSimultaneous(model, step, *impact);
+    AddEndsOfSlips(model, step, *impact);
     AddUnloaded(model, step, *impact);
     AddFeatures(model, *impact, step, &impact->system);
   }
@@ -143,6 +165,26 @@ void RolloutCertifier::AddOtherSlips(const Model<double>& model, const Segment& 
         coupled.GroupOf(other) == coupled.GroupOf(ends) &&
         SlipOf(model, segment.after, other) <= Negligible(model, slip)) {
       AddMargin(0.0, place, "two contacts stop sliding at the same time");
+    }
+  }
+}
+
+// Keeps the contacts that stop sliding at the end of the segment, whatever event ends it.
+void RolloutCertifier::KeepEndsOfSlips(const Model<double>& model, const Segment& segment) {
+  const double end = segment.time + segment.length;
+  std::erase_if(slips_ended_, [&](const Strike& slip) {
+    return end - slip.time > kNearJumpMargin * model.structure->settings.dt;
+  });
+  const auto keep = [&](const ActiveContact& contact) {
+    slips_ended_.push_back({island_ != nullptr ? island_->InWhole(contact) : contact, end});
+  };
+  if (segment.event == EventKind::kSlipEnds) keep(segment.event_contact);
+  for (size_t i = 0; i < segment.contacts.size() && segment.length > 0.0; ++i) {
+    const ActiveContact& contact = segment.contacts[i];
+    const double slip = SlipOf(model, segment.before, contact);
+    if (SlidingSign(segment.modes[i]) != 0.0 &&
+        SlipOf(model, segment.after, contact) <= Negligible(model, slip)) {
+      keep(contact);
     }
   }
 }
@@ -183,7 +225,9 @@ void RolloutCertifier::AddJumpsOfLoads(const Model<double>& model, const Segment
     const double distance = std::abs(jump.time - place.time) / s.settings.dt;
     const std::string what = "as " + jump.what + (jump.is_of_a_joint ? " ends" : " jumps");
     const bool is_touch = segment.event == EventKind::kTouch;
-    if (is_touch && jump.is_of_a_joint) AddJump(distance, place, what);
+    if (is_touch && (jump.is_of_a_joint || StrikesBeforeOrBehind(model, segment, jump))) {
+      AddJump(distance, place, what);
+    }
     beside_jumps_.push_back({island_ != nullptr ? island_->InWhole(event) : event, distance,
                              place.step, place.time, what, is_touch,
                              is_touch && RestitutionOf(model, event).value > 0.0});
@@ -240,11 +284,13 @@ void RolloutCertifier::AddEventOf(const Model<double>& model, long step,
     const Place place{model.structure.get(),           step,
                       segment->time + segment->length, 0,
                       &segment->event_contact,         ContactMode::kOpen};
-    AddMargin(std::abs(rate.value) / rate.terms, place,
-              std::string("grazing: rate of the ") + NameOf(segment->event));
-    if (segment->event == EventKind::kSlipEnds) {
-      AddOtherSlips(model, *segment, place);
+    // Nothing depends on the time at which a contact is handed over if its equation has no rate.
+    if (!segment->hands_over || segment->HasRate(rate.value, rate.terms)) {
+      AddMargin(std::abs(rate.value) / rate.terms, place,
+                std::string("grazing: rate of the ") + NameOf(segment->event));
     }
+    if (segment->event == EventKind::kSlipEnds) AddOtherSlips(model, *segment, place);
+    KeepEndsOfSlips(model, *segment);
     AddJumpsOfLoads(model, *segment, place);
     if (EndsInMeeting(model, *segment) &&
         MeetsACorner(model, segment->after, segment->event_contact)) {
@@ -322,8 +368,7 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
   AddSprings(model, segment->time, segment->before, segment->after);
   // Of the shares that redundant contacts can have of the forces, one with the fewest at a limit.
   SolvedNode& start = segment->stages[0];
-  ContactSolution<double> share = start.solution;
-  inner_impulses_.Choose(start.problem, kDegenerateTolerance, &share);
+  const ContactSolution<double> share = ShareAtStart(model, *segment, &inner_impulses_);
   loaded_.clear();
   double largest = 0.0;
   for (size_t i = 0; i < segment->contacts.size(); ++i) {
@@ -365,6 +410,10 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
       }
     }
     AddFriction(friction, place);
+    if (segment->starts && segment->length == 0.0 && place.mode != ContactMode::kOpen &&
+        IsAtEndOfFace(model, segment->before, contact)) {
+      AddMargin(0.0, place, "where another corner or edge takes over");
+    }
   }
   AddStoppedDead(model, step, *segment);
   ForEachHeldSupport(model, *segment, [&](const SupportSlack& slack) {

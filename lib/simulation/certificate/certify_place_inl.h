@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Where in a rollout a certificate's figure was taken. Included by certify*.cc and discrete_map.cc
-// alone.
+// Where in a rollout a certificate's figure was taken. Included by certify*.cc, discrete_map.cc and
+// segment_share.cc alone.
 
 #include <algorithm>
 #include <cmath>

@@ -9,6 +9,7 @@
 #include "tangible/simulation/certificate/certify_place_inl.h"
 #include "tangible/simulation/certificate/contact_coupling.h"
 #include "tangible/simulation/certificate/tolerances.h"
+#include "tangible/simulation/events/coupled_bodies.h"
 
 namespace tangible {
 namespace {
@@ -68,6 +69,34 @@ void RolloutCertifier::AddStrikes(const ModelStructure& s, const Impulses& impac
     if (!(impact.solution.normal_impulse[i] > 0.0)) continue;
     const ActiveContact& contact = impact.contacts[i];
     strikes_.push_back({island_ != nullptr ? island_->InWhole(contact) : contact, impact.time});
+  }
+}
+
+// A contact that stops sliding as coupled bodies meet: a little later it would still pull as they
+// do, and a little earlier no longer.
+void RolloutCertifier::AddEndsOfSlips(const Model<double>& model, long step,
+                                      const Impulses& impact) {
+  const ModelStructure& s = *model.structure;
+  for (const Strike& slip : slips_ended_) {
+    const double distance = (impact.time - slip.time) / s.settings.dt;
+    const ActiveContact contact =
+        island_ != nullptr ? island_->InIsland(slip.contact) : slip.contact;
+    if (!(distance < kNearJumpMargin) || contact.a < 0 || contact.b < 0) continue;
+    std::vector<ActiveContact> contacts = impact.contacts;
+    contacts.push_back(contact);
+    CoupledBodies coupled;
+    coupled.Connect(s, contacts);
+    for (size_t i = 0; i < impact.contacts.size(); ++i) {
+      const ActiveContact& struck = impact.contacts[i];
+      const ContactBlock<double>& block = impact.problem.contacts[i];
+      const double before =
+          RelativeSpeed(impact.before, struck.a, block.normal_a, struck.b, block.normal_b);
+      if (before < -Negligible(model, before) &&
+          coupled.GroupOf(struck) == coupled.GroupOf(contact)) {
+        AddMargin(distance, {&s, step, impact.time, i, &struck, impact.solution.modes[i]},
+                  "an impact as a contact stops sliding");
+      }
+    }
   }
 }
 

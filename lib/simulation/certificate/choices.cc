@@ -9,6 +9,7 @@
 #include "tangible/simulation/certificate/approach_inl.h"
 #include "tangible/simulation/certificate/certify.h"
 #include "tangible/simulation/certificate/certify_grazing.h"
+#include "tangible/simulation/certificate/segment_share.h"
 #include "tangible/simulation/certificate/support_slacks.h"
 #include "tangible/simulation/certificate/tolerances.h"
 #include "tangible/simulation/events/servo_bounds.h"
@@ -473,9 +474,7 @@ void ChoiceWatch::AddForces(const Model<double>& model, const IslandRecord& isla
 void ChoiceWatch::AddSegment(const Model<double>& model, const IslandRecord& island, long step,
                              Segment* segment) {
   if (segment->length > 0.0) {
-    SolvedNode& start = segment->stages[0];
-    ContactSolution<double> share = start.solution;
-    inner_impulses_.Choose(start.problem, kDegenerateTolerance, &share);
+    const ContactSolution<double> share = ShareAtStart(model, *segment, &inner_impulses_);
     for (size_t i = 0; i < segment->contacts.size(); ++i) {
       AddForces(model, island, step, *segment, i, share);
     }

@@ -394,12 +394,27 @@ bool MeetsACorner(const Model<double>& model, const State<double>& state,
   return false;
 }
 
+namespace {
+
+bool HasDisc(const Model<double>& model, const ActiveContact& contact) {
+  return contact.IsOfShapes() && (ShapeOfA(model, contact).type == ShapeType::kCircle ||
+                                  ShapeOfB(model, contact).type == ShapeType::kCircle);
+}
+
+// Whether the contact is among the closest features of its pair with the poses of its bodies.
+bool IsClosest(const Model<double>& model, const ActiveContact& contact, const Pose<double>& a,
+               const Pose<double>& b) {
+  ContactFeature features[2];
+  const int count =
+      FindFeatures(model, contact.a, a, contact.b, b, contact.Parts(), kInfinity, features);
+  return count == 0 || std::find(features, features + count, contact.feature) != features + count;
+}
+
+}  // namespace
+
 bool IsHandedOver(const Model<double>& model, const State<double>& state,
                   const ActiveContact& contact, double time) {
-  if (!contact.IsOfShapes() || (ShapeOfA(model, contact).type != ShapeType::kCircle &&
-                                ShapeOfB(model, contact).type != ShapeType::kCircle)) {
-    return false;
-  }
+  if (!HasDisc(model, contact)) return false;
   const auto beside = [&](int body, double after) {
     Pose<double> pose = state.PoseOf(body);
     const double* twist = &state.twist[3 * static_cast<size_t>(body)];
@@ -409,12 +424,23 @@ bool IsHandedOver(const Model<double>& model, const State<double>& state,
     return pose;
   };
   for (const double after : {-time, time}) {
-    ContactFeature features[2];
-    const int count = FindFeatures(model, contact.a, beside(contact.a, after), contact.b,
-                                   beside(contact.b, after), contact.Parts(), kInfinity, features);
-    if (count > 0 && std::find(features, features + count, contact.feature) == features + count) {
-      return true;
-    }
+    if (!IsClosest(model, contact, beside(contact.a, after), beside(contact.b, after))) return true;
+  }
+  return false;
+}
+
+bool IsAtEndOfFace(const Model<double>& model, const State<double>& state,
+                   const ActiveContact& contact) {
+  if (!HasDisc(model, contact)) return false;
+  ContactRows<double> rows;
+  EvaluateContactRows(model, state, contact, &rows);
+  const Vector2<double> normal = rows.geometry.normal;
+  const double move =
+      kFeatureMargin * std::min(RadiusOf(model, contact.a), RadiusOf(model, contact.b));
+  for (const double side : {move, -move}) {
+    Pose<double> moved = state.PoseOf(contact.a);
+    moved.position += side * Vector2<double>(normal.y(), -normal.x());
+    if (!IsClosest(model, contact, moved, state.PoseOf(contact.b))) return true;
   }
   return false;
 }

@@ -39,4 +39,10 @@ bool MeetsACorner(const Model<double>& model, const State<double>& state,
 bool IsHandedOver(const Model<double>& model, const State<double>& state,
                   const ActiveContact& contact, double time);
 
+/// Whether a disc touches exactly where a face ends: a little to one side of it, by kFeatureMargin
+/// of the smaller body's size, it touches the face and to the other the end. False where neither
+/// shape is a disc.
+bool IsAtEndOfFace(const Model<double>& model, const State<double>& state,
+                   const ActiveContact& contact);
+
 }  // namespace tangible

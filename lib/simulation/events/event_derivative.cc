@@ -171,7 +171,10 @@ double EventDerivative::EventGradient(const Model<double>& model, Segment* segme
   double residual = 0.0;
   gradient->setZero(s.num_variables() + 1);
   std::vector<JacobianEntry> entries;
-  if (segment->event == EventKind::kTouch) {
+  if (segment->passes) {
+    AddPassingGradient(model, segment->after, segment->event_lost, segment->event_contact,
+                       &scratch_, &entries);
+  } else if (segment->event == EventKind::kTouch) {
     AddGapGradient(model, segment->after, segment->event_contact, &scratch_, &entries);
   } else if (segment->event == EventKind::kReturn) {
     AddApproachGradient(model, segment->after, segment->event_contact, &scratch_, &entries);

@@ -162,7 +162,7 @@ std::vector<LoadJump> LoadJumpsWithin(const Model<double>& model, double from, d
   const ModelStructure& s = *model.structure;
   std::vector<LoadJump> jumps;
   const auto add = [&](double time, const std::vector<int>& bodies, const std::string& what) {
-    if (time >= from && time <= to) jumps.push_back({time, bodies, what, false});
+    if (time >= from && time <= to) jumps.push_back({time, bodies, what});
   };
   const auto add_number = [&](int number, const std::vector<int>& bodies, const std::string& what) {
     if (number >= 0) add(model.parameters[number], bodies, what);
@@ -198,7 +198,9 @@ std::vector<LoadJump> LoadJumpsWithin(const Model<double>& model, double from, d
   ForEachKnot(model, from, to, [&](const Edge& edge) {
     for (const PathIndex& path : s.paths) {
       if (edge.gives_way || path.numbers + kPathDelay != edge.window.number) continue;
+      const size_t before = jumps.size();
       add(edge.time, {path.body}, "the speed of body " + s.bodies[path.body].name);
+      if (jumps.size() > before) jumps.back().driven = path.body;
     }
   });
   return jumps;

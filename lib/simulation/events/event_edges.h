@@ -73,6 +73,7 @@ struct LoadJump {
   std::vector<int> bodies;
   std::string what;            ///< "the window of force push"
   bool is_of_a_joint = false;  ///< whether a joint ends, which an impact meets or not
+  int driven = -1;             ///< the body whose speed jumps
 };
 
 /// The jumps of loads within [from, to]: windows of forces, steps of signals, ends of joints, and

@@ -130,6 +130,7 @@ bool EventStepper::AddInstant(const Model<double>& model, double t, EventKind ki
   segment.event_index = -1;
   if (contact != nullptr) {
     segment.event_contact = *contact;
+    segment.hands_over = segment.passes = false;
   }
   if (!flow_.Run(model, &segment, &outcome->message)) {
     return false;

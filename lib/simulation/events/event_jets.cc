@@ -238,6 +238,11 @@ class EventReplay {
     }
     ContactRows<T> rows;
     EvaluateActiveRows(model_, after, contact, &rows);
+    if (segment->passes) {
+      ContactRows<T> lost;
+      EvaluateContactRows(model_, after, segment->event_lost, &lost);
+      return SineBetween(lost.geometry, rows.geometry);
+    }
     return segment->event == EventKind::kTouch ? rows.geometry.gap
            : segment->event == EventKind::kReturn
                ? RelativeSpeed(after, contact.a, rows.normal_a, contact.b, rows.normal_b)

@@ -51,7 +51,7 @@ EventPart* EventRecord::Add() {
 
 bool Segment::HasRate(double rate, double terms) const {
   double least = kNoRate * terms;
-  if (event == EventKind::kTouch && event_contact.IsOfShapes()) {
+  if (event == EventKind::kTouch && event_contact.IsOfShapes() && !passes) {
     double fastest = 0.0;
     for (const int body : {event_contact.a, event_contact.b}) {
       const double* const twist = &after.twist[3 * static_cast<size_t>(body)];

@@ -113,6 +113,12 @@ struct Segment {
 
   EventKind event = EventKind::kStepEnd;
   ActiveContact event_contact;
+  /// kTouch: the feature of the contact `event_lost` gives way to that of event_contact.
+  bool hands_over = false;
+  /// The same without a jump of the normal, at a rounded corner: the gap is closed on either side,
+  /// and the event's equation is SineBetween.
+  bool passes = false;
+  ActiveContact event_lost;
   CoefficientSource event_friction;  ///< of kSlipBegins
   double event_sign = 0.0;  ///< sign of kSlipBegins' tangential force, of kServoBound's bound
   int event_number = -1;    ///< kEdge: the number that is the time; −1: a constant

@@ -588,6 +588,9 @@ void EventSearch::SetEvent(const Event& event, Segment* segment) {
   segment->event_support = event.support;
   segment->release = event.release;
   segment->at_once = event.at_once;
+  segment->hands_over = event.kind == EventKind::kTouch && event.length == event.hands_over_at;
+  segment->passes = segment->hands_over && event.passes;
+  segment->event_lost = event.lost;
   if (event.kind == EventKind::kSlipBegins && event.release.empty()) {
     segment->event_friction = segment->friction[event.index];
   }

@@ -112,6 +112,10 @@ class EventSearch {
     std::vector<ReleaseRate> release;  ///< of contacts that let go together
     bool at_once = false;
     bool at_start = false;
+    /// Where a contact is handed over (Segment::hands_over), which counts while that is the event.
+    double hands_over_at = -1.0;
+    bool passes = false;
+    ActiveContact lost{};
   };
   class PairSearch;  ///< event_search_pair.cc
   Sample* At(const Model<double>& model, double length);

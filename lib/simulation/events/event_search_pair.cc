@@ -7,6 +7,7 @@
 #include <limits>
 #include <utility>
 
+#include "tangible/dynamics/jacobian/contact_gradient.h"
 #include "tangible/dynamics/model/driven_bodies.h"
 #include "tangible/dynamics/model/tolerances.h"
 #include "tangible/math/scalar.h"
@@ -48,6 +49,24 @@ ActiveContact NextAt(const Model<double>& model, const State<double>& state,
     }
   }
   return next;
+}
+
+// Whether a contact of a rounded corner passes from an edge to a corner, or back, where both have
+// the same normal.
+bool PassesSmoothly(const Model<double>& model, const State<double>& state,
+                    const ActiveContact& lost, const ActiveContact& next) {
+  const auto is_of_corners = [](const ActiveContact& contact) {
+    return contact.feature.kind == FeatureKind::kVertexVertex;
+  };
+  if (is_of_corners(lost) == is_of_corners(next) ||
+      !(IsRound(ShapeOfA(model, lost)) || IsRound(ShapeOfB(model, lost)))) {
+    return false;
+  }
+  ContactRows<double> before, after;
+  EvaluateContactRows(model, state, lost, &before);
+  EvaluateContactRows(model, state, next, &after);
+  return before.geometry.normal.dot(after.geometry.normal) > 0.0 &&
+         std::abs(SineBetween(before.geometry, after.geometry)) <= kSameNormal;
 }
 
 // Of a run's gap: an end that is nearer by less is the vertex over the run.
@@ -612,7 +631,11 @@ void EventSearch::PairSearch::SearchHandOver() {
   if (high < event_.length) {
     event_.kind = EventKind::kTouch;
     event_.length = high;
-    event_.contact = NextOf(*search_.At(model_, high));
+    const Sample& sample = *search_.At(model_, high);
+    event_.contact = NextOf(sample);
+    event_.lost = *LostAt(sample.motion.after);
+    event_.hands_over_at = high;
+    event_.passes = PassesSmoothly(model_, sample.motion.after, event_.lost, event_.contact);
   }
 }
 

@@ -601,7 +601,7 @@ Segment& EventStepper::BeginSegment(double now, double until, const State<double
   segment.middle = 0.5 * (now + until);
   segment.before = state;
   segment.event_number = -1;
-  segment.at_once = false;
+  segment.at_once = segment.hands_over = segment.passes = false;
   segment.release.clear();
   segment.further_edges.clear();
   segment.edge_before = -1;

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/simulation/certificate/segment_share.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "tangible/simulation/certificate/certify_place_inl.h"
+#include "tangible/simulation/certificate/tolerances.h"
+#include "tangible/simulation/events/load_speed.h"
+
+namespace tangible {
+
+ContactSolution<double> ShareAtStart(const Model<double>& model, const Segment& segment,
+                                     InnerImpulses* inner_impulses) {
+  const ContactProblem<double>& problem = segment.stages[0].problem;
+  ContactSolution<double> share = segment.stages[0].solution;
+  ContactProblem<double> sliding;
+  for (size_t i = 0; i < segment.contacts.size(); ++i) {
+    const double sign = SlidingSign(segment.modes[i]);
+    if (sign == 0.0) continue;
+    const double slip = SpeedsOf(model, segment.before, segment.contacts[i]).slip;
+    if (std::abs(slip) <= Negligible(model, slip)) continue;
+    if (sliding.contacts.empty()) sliding = problem;
+    // The problem's slips are rates, among which a contact that slides evenly would look at rest.
+    sliding.contacts[i].c_t += sign * std::max(1.0, LoadAcceleration(problem));
+  }
+  inner_impulses->Choose(sliding.contacts.empty() ? problem : sliding, kDegenerateTolerance,
+                         &share);
+  return share;
+}
+
+}  // namespace tangible

@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// How contacts share the forces at the start of a motion by events, for judging which of them are
+// at a limit.
+
+#include "tangible/lcp/contact/contact_inner_impulses.h"
+#include "tangible/simulation/events/event_record.h"
+
+namespace tangible {
+
+/// The accelerations' solution at the start of a segment, with one of the shares that redundant
+/// contacts can have of its forces, at which the fewest are at a limit. The force of a contact that
+/// slides is determined, whatever its slip's rate.
+ContactSolution<double> ShareAtStart(const Model<double>& model, const Segment& segment,
+                                     InnerImpulses* inner_impulses);
+
+}  // namespace tangible
