@@ -94,11 +94,56 @@ bool IsBetter(const Minimum& a, const Minimum& b) {
 struct FirstPoint {
   Eigen::VectorXd parameters;
   double gradient_norm = 0.0;  ///< at the initial values
+  long rollouts = 0;           ///< of fits without a parameter
 };
 
+/// Sets to 0 the effects that are rounding: those so small that the parameter cannot be told from
+/// the observations, which are of the size of rounding beside those of others, or change where the
+/// parameter is moved by a little.
+void LeaveOutRounding(const Eigen::VectorXd& p, const std::vector<ParameterEntry>& entries,
+                      Linearizer* linearizer, Eigen::VectorXd* effect) {
+  const HuberBounds plain{0.0, 0.0};
+  const Eigen::VectorXd all = *effect;
+  const auto effect_of = [&](Eigen::Index k) {
+    const ParameterEntry& entry = entries[static_cast<size_t>(k)];
+    return all[k] * (entry.logarithmic ? 1.0 : std::max(std::abs(p[k]), entry.scale));
+  };
+  double largest = 0.0;
+  for (Eigen::Index k = 0; k < all.size(); ++k) largest = std::max(largest, effect_of(k));
+  for (Eigen::Index k = 0; k < all.size(); ++k) {
+    if (!(effect_of(k) < kMayBeRounding)) continue;
+    bool is_rounding = effect_of(k) < kRoundingBeside * largest;
+    if (!is_rounding) {
+      const ParameterEntry& entry = entries[static_cast<size_t>(k)];
+      const double step = kBesideStep * std::max(std::abs(p[k]), entry.scale);
+      Eigen::VectorXd beside = p;
+      beside[k] += p[k] + step < entry.upper ? step : -step;
+      Linearisation model;
+      Linearisation target;
+      is_rounding =
+          linearizer->Linearise(ToInternal(entries, beside), plain, &model, &target) &&
+          std::abs(EffectOf(linearizer->layout(), model)[k] - all[k]) > kChangesAsRounding * all[k];
+    }
+    if (is_rounding) (*effect)[k] = 0.0;
+  }
+}
+
+/// Where the others are once they have followed the observations without a parameter that has no
+/// effect where it is, such as the friction of what is not pushed far enough to slide: it may have
+/// one there. Empty where the fit without it fails.
+Eigen::VectorXd WithoutParameter(const FitOptions& options, int parameter, const Eigen::VectorXd& p,
+                                 LeastSquaresProblem* problem, long* rollouts) {
+  if (problem->entries().size() < 2) return {};
+  ProblemWithHeld held(parameter, p[parameter], problem);
+  const Minimum minimum = Minimise(
+      options, held.Left(p), [] { return 0.0; }, {}, &held);
+  *rollouts += minimum.rollouts;
+  return minimum.status == FitStatus::kFailed ? Eigen::VectorXd() : held.All(minimum.parameters);
+}
+
 /// A point near the initial one at which each parameter changes a residual: the initial point
-/// itself unless a parameter has no effect there. Returns false, with the reason in the result,
-/// where there is none.
+/// itself unless a parameter has no effect there; else beside it, or where the others lead without
+/// it. Returns false, with the reason in the result, where there is none.
 bool FindStart(const FitOptions& options, LeastSquaresProblem* problem, Linearizer* linearizer,
                FirstPoint* first, FitResult* result) {
   const std::vector<ParameterEntry>& entries = problem->entries();
@@ -113,7 +158,12 @@ bool FindStart(const FitOptions& options, LeastSquaresProblem* problem, Lineariz
   }
   result->initial_cost = target.cost;
   first->gradient_norm = target.gradient.norm();
-  Eigen::VectorXd effect = EffectOf(linearizer->layout(), model);
+  const auto effect_at = [&](const Eigen::VectorXd& at) {
+    Eigen::VectorXd effect = EffectOf(linearizer->layout(), model);
+    LeaveOutRounding(at, entries, linearizer, &effect);
+    return effect;
+  };
+  Eigen::VectorXd effect = effect_at(p);
   for (size_t round = 0; round <= entries.size(); ++round) {
     const int parameter = FindNoEffect(effect);
     if (parameter < 0) {
@@ -124,12 +174,21 @@ bool FindStart(const FitOptions& options, LeastSquaresProblem* problem, Lineariz
     for (size_t i = 0; i < std::size(kNudges) && !found && round < entries.size(); ++i) {
       const Eigen::VectorXd nudged = Nudged(entries[parameter], parameter, kNudges[i], p);
       if (linearizer->Linearise(ToInternal(entries, nudged), huber, &model, &target)) {
-        effect = EffectOf(linearizer->layout(), model);
+        effect = effect_at(nudged);
         found = effect[parameter] > kNoEffect;
       }
       if (found) {
         p = nudged;
       }
+    }
+    if (!found && round < entries.size()) {
+      const Eigen::VectorXd moved =
+          WithoutParameter(options, parameter, p, problem, &first->rollouts);
+      found = moved.size() > 0 &&
+              linearizer->Linearise(ToInternal(entries, moved), huber, &model, &target);
+      if (found) effect = effect_at(moved);
+      found = found && effect[parameter] > kNoEffect;
+      if (found) p = moved;
     }
     if (!found) {
       result->parameter = parameter;
@@ -138,7 +197,8 @@ bool FindStart(const FitOptions& options, LeastSquaresProblem* problem, Lineariz
   }
   result->status = FitStatus::kNoEffect;
   result->message =
-      "parameter \"" + entries[result->parameter].name + "\" has no effect on any residual";
+      "parameter \"" + entries[result->parameter].name + "\" has no effect on any residual" +
+      (entries.size() > 1 ? ", neither at the initial values nor where the others lead" : "");
   return false;
 }
 
@@ -460,7 +520,7 @@ void RunStarts(FitRun* run, FitResult* result) {
                     run->logged ? &log->search : nullptr);
   FirstPoint first;
   const bool found = FindStart(run->options, run->problem, &search, &first, result);
-  run->rollouts = search.rollouts();
+  run->rollouts = search.rollouts() + first.rollouts;
   if (!found) {
     return;
   }

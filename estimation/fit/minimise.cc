@@ -34,6 +34,9 @@ constexpr double kMostAtKink = 20;
 // many times.
 constexpr int kMaxAttempts = 3;
 
+// The attempts of an iteration with smaller and smaller regions, where it ends at a level.
+constexpr int kMostLevels = 8;
+
 // From this number of parameters on sparse factorisations are faster.
 constexpr int kManyParameters = 100;
 
@@ -67,10 +70,18 @@ class SharedLinearisation : public ceres::EvaluationCallback {
       return;
     }
     at_ = *q_;
+    if (!evaluate_jacobians && IsFarOff()) {
+      ok_ = has_model_ = false;
+      return;
+    }
+    if (evaluate_jacobians) centre_ = at_;
     ok_ = evaluate_jacobians ? linearizer_->Linearise(*q_, huber_, &model_, &target_)
                              : linearizer_->Cost(*q_, huber_, &block_costs_, &target_.cost);
     has_model_ = ok_ && evaluate_jacobians;
   }
+
+  /// `entries`: of q.
+  void LimitSteps(const std::vector<ParameterEntry>* entries) { entries_ = entries; }
 
   void SetHuber(double current) {
     huber_.current = current;
@@ -95,9 +106,23 @@ class SharedLinearisation : public ceres::EvaluationCallback {
   }
 
  private:
+  // Whether a step from the last linear model changes a logarithm by too much.
+  bool IsFarOff() const {
+    if (entries_ == nullptr || centre_.size() != at_.size()) return false;
+    for (Eigen::Index k = 0; k < at_.size(); ++k) {
+      if ((*entries_)[static_cast<size_t>(k)].logarithmic &&
+          std::abs(at_[k] - centre_[k]) > kStepOfLogarithm) {
+        return true;
+      }
+    }
+    return false;
+  }
+
   Linearizer* linearizer_;
   HuberBounds huber_;
   const Eigen::VectorXd* q_;
+  const std::vector<ParameterEntry>* entries_ = nullptr;
+  Eigen::VectorXd centre_;  ///< of the last linear model
   Eigen::VectorXd at_;
   Linearisation model_, target_;
   Eigen::VectorXd block_costs_;
@@ -210,7 +235,9 @@ class Minimiser : public ceres::IterationCallback {
         q_(ToInternal(entries_, start)),
         shared_(&linearizer_, {options.huber, options.huber}, &q_),
         held_(entries_.size(), false),
-        pushed_(entries_.size(), 0) {}
+        pushed_(entries_.size(), 0) {
+    shared_.LimitSteps(&entries_);
+  }
 
   Minimum Run() {
     shared_.Update();
@@ -233,6 +260,11 @@ class Minimiser : public ceres::IterationCallback {
     if (summary.iteration > 0 || minimum_.iterations.empty()) {  // else the last round's end again
       Record(accepted);
     }
+    if (accepted && IsLevel()) {
+      level_radius_ = summary.trust_region_radius;
+      return ceres::SOLVER_ABORT;
+    }
+    if (accepted) last_good_ = q_;
     if (accepted && CountPushes()) {
       return ceres::SOLVER_TERMINATE_SUCCESSFULLY;
     }
@@ -285,6 +317,16 @@ class Minimiser : public ceres::IterationCallback {
       change = change || (!held_[k] && pushed_[k] >= kPushesToHold);
     }
     return change;
+  }
+
+  /// Whether no parameter that is free has an effect on any residual, which are not 0: a step that
+  /// has led to where nothing happens, and from which none leads back.
+  bool IsLevel() const {
+    if (!(shared_.model().cost > ExactCost())) return false;
+    for (const BlockFactor& block : shared_.model().blocks) {
+      if (!(block.jacobian().array() == 0.0).all()) return false;
+    }
+    return AnyFree(0, layout_.num_parameters());
   }
 
   bool PushedOut(size_t k) const {
@@ -385,6 +427,8 @@ class Minimiser : public ceres::IterationCallback {
         if (!gave_up_ && shared_.ok() && !HasIterationsLeft()) {
           if (WhatIsLeft().empty()) {
             minimum_.status = FitStatus::kConverged;
+            minimum_.message = "no step is left that matters, at the limit of " +
+                               std::to_string(options_.max_iterations) + " iterations";
           } else {
             AcceptKink();
           }
@@ -513,10 +557,18 @@ class Minimiser : public ceres::IterationCallback {
     solver.update_state_every_iteration = true;
     solver.callbacks.push_back(this);
     ceres::Solver::Summary summary;
-    gains_.clear();
-    last_cost_ = kInfinity;
+    gave_up_ = false;  // with other parameters held it goes on
     const QuietLog quiet;
-    ceres::Solve(solver, &problem, &summary);
+    for (int attempt = 0; attempt < kMostLevels; ++attempt) {
+      gains_.clear();
+      last_cost_ = kInfinity;
+      level_radius_ = 0.0;
+      ceres::Solve(solver, &problem, &summary);
+      if (level_radius_ == 0.0 || last_good_.size() == 0) break;
+      q_ = last_good_;
+      solver.initial_trust_region_radius =
+          kSmallerRegion * std::min(level_radius_, solver.initial_trust_region_radius);
+    }
     minimum_.message = summary.message;
     if (gave_up_) {
       minimum_.message = "no progress in the first iterations";
@@ -661,6 +713,7 @@ class Minimiser : public ceres::IterationCallback {
     if (model.cost <= ExactCost()) {
       return "";
     }
+    if (IsLevel()) return "no parameter has an effect on any residual at these values";
     const auto kind =
         options_.huber > 0.0 ? FinalSteps::Kind::kNewton : FinalSteps::Kind::kGaussNewton;
     const Eigen::VectorXd lengths = System(FinalSteps::Kind::kGaussNewton).lengths();
@@ -700,7 +753,9 @@ class Minimiser : public ceres::IterationCallback {
   std::vector<int> pushed_;    ///< iterations in a row that the cost falls beyond the bound
   std::vector<double> gains_;  ///< of accepted iterations
   double last_cost_ = kInfinity;
-  int accepted_ = 0;  ///< iterations, with the initial point
+  int accepted_ = 0;           ///< iterations, with the initial point
+  Eigen::VectorXd last_good_;  ///< q of the last one where some parameter had an effect
+  double level_radius_ = 0.0;  ///< of the region whose step has led to where none has; 0: none
   bool gave_up_ = false;
   bool slow_tail_ = false;  ///< whether Ceres was ended by SlowTail
   double cost_ = 0.0;       ///< of the fit's own loss, at the last accepted point

@@ -225,7 +225,8 @@ class Profiler {
 bool IsParabola(const FitOptions& options, const FitResult& result, int k,
                 LeastSquaresProblem* problem, long* rollouts) {
   const Uncertainty& u = result.uncertainty;
-  if (k >= u.covariance.rows() || !(u.covariance(k, k) > 0.0)) {
+  // How the others follow is known only where all are determined.
+  if (k >= u.covariance.rows() || !(u.covariance(k, k) > 0.0) || !u.covariance.allFinite()) {
     return true;
   }
   const std::vector<ParameterEntry>& entries = problem->entries();
@@ -236,7 +237,7 @@ bool IsParabola(const FitOptions& options, const FitResult& result, int k,
   for (const double side : {-1.0, 1.0}) {
     Eigen::VectorXd p = result.estimate;
     for (Eigen::Index i = 0; i < u.covariance.rows(); ++i) {
-      if (std::isfinite(u.covariance(i, k))) p[i] += side * length * u.covariance(i, k);
+      p[i] += side * length * u.covariance(i, k);
     }
     Eigen::VectorXd blocks;
     double cost = 0.0;
@@ -354,6 +355,10 @@ std::vector<std::pair<int, std::string>> NeedProfiles(const FitOptions& options,
   const Certificate& certificate = result.certificate;
   const bool kink = !certificate.verdict.empty() && !IsTrustworthyMap(certificate);
   const bool few = problem->num_blocks() <= kMostBlocks;
+  const std::vector<ConfidenceInterval>& intervals = result.uncertainty.confidence_95;
+  const auto num_undetermined =
+      std::count_if(intervals.begin(), intervals.end(),
+                    [](const ConfidenceInterval& interval) { return !interval; });
   for (int k = 0; k < static_cast<int>(entries.size()); ++k) {
     const ParameterEntry& entry = entries[static_cast<size_t>(k)];
     const auto& asked = options.profiles;
@@ -373,8 +378,8 @@ std::vector<std::pair<int, std::string>> NeedProfiles(const FitOptions& options,
     if (IsAtBound(entry, result.estimate[k])) {
       proposed.emplace_back(k, "at a bound");
     } else if (!trusting) {
-      // What is not determined has no profile, unless it is the only parameter.
-      if (entries.size() == 1) proposed.emplace_back(k, "no effect at the estimate");
+      // What is not determined has no profile, unless it alone is not: then it may be from one side.
+      if (num_undetermined == 1) proposed.emplace_back(k, "no effect at the estimate");
     } else if (kink) {
       proposed.emplace_back(k, "the certificate names a kink");
     } else if (meets(result.uncertainty.DoesNotFit() ? robust : trusting) || meets(robust)) {

@@ -9,6 +9,20 @@ namespace tangible {
 /// Of sigma: a parameter that moves the vector of residuals by no more, changed by its own
 /// magnitude, has no effect.
 inline constexpr double kNoEffect = 1e-12;
+/// Of sigma: an effect of that kind that is smaller may be the rounding of effects that cancel. It
+/// is if it changes by kChangesAsRounding of itself where the parameter is moved by kBesideStep of
+/// its magnitude.
+inline constexpr double kMayBeRounding = 1e-7;
+inline constexpr double kBesideStep = 1e-6;
+/// Of the largest effect of a parameter: the smaller ones of that kind are rounding.
+inline constexpr double kRoundingBeside = 1e-10;
+inline constexpr double kChangesAsRounding = 1e-3;
+/// Of 1: the most by which a step may change the logarithm of a parameter, a factor of 33: beyond,
+/// a model may take minutes for a run that says nothing.
+inline constexpr double kStepOfLogarithm = 3.5;
+/// Of the radius of the trust region: where an iteration has ended at values at which no parameter
+/// has an effect, it is repeated with a region so much smaller.
+inline constexpr double kSmallerRegion = 1e-2;
 /// Of the cost: minima of two starts whose costs differ by less are the same.
 inline constexpr double kSameCost = 1e-6;
 /// Of the lower cost, beyond 1 σ²: a minimum that costs more is not the global one.

@@ -50,6 +50,8 @@ class EventTimes {
 
   double Value(int row) const { return rows_[row].value; }
   bool IsMissing(int row) const { return rows_[row].missing; }
+  /// Whether the time of a missing event has a derivative, which leads towards it.
+  bool LeadsTowards(int row) const { return rows_[row].found >= 0 || !rows_[row].by_end.empty(); }
 
   /// The derivative of a row; `variable_dot` gives that of a variable of the final state, or of a
   /// number of the model. Valid after a run with tangents or Jets.

@@ -179,8 +179,11 @@ bool Outline::IsAfterStart(int run, const Vector2<double>& x) const {
     return h >= 0.0 || s >= -h * of.bisector_before - RoomOf(of);
   }
   if (of.before != OutlineJoint::kConcave) return false;
-  const OutlineRun& previous = runs_[Previous(run)];
-  return HeightOver(previous, x) <= 0.0 && FootOver(previous, x) >= 0.0 && MayContain(x);
+  // What is solid behind the run before bounds it, up to the end of an open line.
+  const int before = Previous(run);
+  const OutlineRun& previous = runs_[before];
+  return HeightOver(previous, x) <= 0.0 && FootOver(previous, x) >= 0.0 &&
+         (previous.before != OutlineJoint::kEnd || IsAfterStart(before, x)) && MayContain(x);
 }
 
 bool Outline::IsBeforeEnd(int run, const Vector2<double>& x) const {
@@ -192,8 +195,10 @@ bool Outline::IsBeforeEnd(int run, const Vector2<double>& x) const {
     return h >= 0.0 || left >= -h * of.bisector_after - RoomOf(of);
   }
   if (of.after != OutlineJoint::kConcave) return false;
-  const OutlineRun& next = runs_[Next(run)];
-  return HeightOver(next, x) <= 0.0 && FootOver(next, x) <= next.length && MayContain(x);
+  const int after = Next(run);
+  const OutlineRun& next = runs_[after];
+  return HeightOver(next, x) <= 0.0 && FootOver(next, x) <= next.length &&
+         (next.after != OutlineJoint::kEnd || IsBeforeEnd(after, x)) && MayContain(x);
 }
 
 // Whether a point at some depth behind a run is on the free side of another one that is nearer.

@@ -410,10 +410,6 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
       }
     }
     AddFriction(friction, place);
-    if (segment->starts && segment->length == 0.0 && place.mode != ContactMode::kOpen &&
-        IsAtEndOfFace(model, segment->before, contact)) {
-      AddMargin(0.0, place, "where another corner or edge takes over");
-    }
   }
   AddStoppedDead(model, step, *segment);
   ForEachHeldSupport(model, *segment, [&](const SupportSlack& slack) {

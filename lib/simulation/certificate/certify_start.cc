@@ -247,17 +247,21 @@ void RolloutCertifier::AddSupportsAtStart(const Model<double>& model, const Segm
   }
 }
 
-// A disc that starts exactly at the end of a face, or just beside it, and moves along: on one side
-// it leaves the face later. A direction that changes its speed alone does not change where it is.
+// A disc that starts exactly at the end of a face, or just beside it: on one side it leaves the face
+// later, or not at all. While it moves along, a direction that changes its speed alone does not
+// change where it is.
 void RolloutCertifier::AddHandOversAtStart(const Model<double>& model, const State<double>& start,
                                            const std::vector<const ActiveContact*>& touching) {
   const ModelStructure& s = *model.structure;
   for (const ActiveContact* contact : touching) {
-    if (!IsHandedOver(model, start, *contact, kNearKinkMargin * s.settings.dt)) continue;
+    const bool goes_along = IsHandedOver(model, start, *contact, kNearKinkMargin * s.settings.dt);
+    if (!goes_along && !IsAtEndOfFace(model, start, *contact)) continue;
     for (Eigen::Index c = 0; c < Directions().cols(); ++c) {
       bool moves = false;
       for (const int body : {contact->a, contact->b}) {
         moves = moves || !Directions().col(c).segment<3>(s.PoseVariable(body, 0)).isZero(0.0);
+        moves = moves || (!goes_along &&
+                          !Directions().col(c).segment<3>(s.TwistVariable(body, 0)).isZero(0.0));
         const BodyIndex& index = s.bodies[body];
         for (int k = 0; k < index.num_shape_numbers; ++k) {
           moves = moves || Directions()(s.ParameterVariable(index.shape_numbers + k), c) != 0.0;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/simulation/stepping/run_warnings.h"
 
+#include <algorithm>
 #include <cstdio>
 #include <utility>
 
@@ -48,6 +49,38 @@ std::string BrokenLimitMessage(const Model<double>& model, const State<double>& 
 
 }  // namespace
 
+void RunWarnings::LookBehindLines(const Model<double>& model, long k, double t,
+                                  const std::vector<ActiveContact>& contacts) {
+  if (!behind_.empty()) return;
+  std::vector<ActiveContact> with_lines;
+  for (const ActiveContact& contact : contacts) {
+    if (!contact.IsOfShapes()) continue;
+    const auto is_line = [&](int body, int part) {
+      const Outline* const outline = model.OutlineOf(body, part);
+      return model.CurveOf(body, part) != nullptr || (outline != nullptr && !outline->IsPolygon());
+    };
+    const bool first = is_line(contact.a, contact.feature.part_a);
+    if (!first && !is_line(contact.b, contact.feature.part_b)) continue;
+    with_lines.push_back(contact);
+    const int body = first ? contact.b : contact.a;
+    const bool is_new =
+        std::none_of(last_contacts_.begin(), last_contacts_.end(),
+                     [&](const auto& other) { return other.IsOfTheSameShapes(contact); });
+    if (k <= 1 || !is_new || !(contact.gap < -2.0 * RadiusOf(model, body))) continue;
+    const std::vector<BodyIndex>& bodies = model.structure->bodies;
+    char text[256];
+    std::snprintf(text, sizeof text,
+                  "body %s is behind the line of body %s from t = %.6g s on, by %.3g m, and is "
+                  "pushed out through it: it came past an end of the line, behind which all is "
+                  "solid",
+                  bodies[body].name.c_str(), bodies[first ? contact.a : contact.b].name.c_str(), t,
+                  -contact.gap);
+    behind_ = text;
+    return;
+  }
+  last_contacts_ = std::move(with_lines);
+}
+
 std::vector<std::string> RunWarnings::Finish(const Model<double>& model,
                                              const RolloutReport& report,
                                              const State<double>& final) {
@@ -58,7 +91,7 @@ std::vector<std::string> RunWarnings::Finish(const Model<double>& model,
   if (energy.empty()) energy = EnergyOfOverlap(model, initial_, final, report.penetration_max);
   for (std::string line :
        {coordinates_.Message(model), joints_.Message(model), BrokenLimitMessage(model, initial_),
-        FlushStepsMessage(model), std::move(energy)}) {
+        FlushStepsMessage(model), behind_, std::move(energy)}) {
     if (!line.empty()) lines.push_back(std::move(line));
   }
   return lines;

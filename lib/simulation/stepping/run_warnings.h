@@ -23,7 +23,10 @@ class RunWarnings {
   /// quarter of a chain's step.
   void Add(const Model<double>& model, long k, double t, const State<double>& state,
            const Stepper* stepper) {
-    if (stepper != nullptr) coordinates_.LookAtContacts(state, t, stepper->record().contacts);
+    if (stepper != nullptr) {
+      coordinates_.LookAtContacts(state, t, stepper->record().contacts);
+      LookBehindLines(model, k, t, stepper->record().contacts);
+    }
     if (k % kLookEvery != 0) return;
     coordinates_.LookAtJoints(model, state, t);
     if (joints_.watches()) joints_.Look(model, state, t);
@@ -43,9 +46,17 @@ class RunWarnings {
  private:
   static constexpr long kLookEvery = 16;
 
+  /// Keeps the first contact that a body has behind a polyline or spline, deeper than the body is
+  /// large, where it was not in contact a step before: it has not come through the line but past
+  /// its end.
+  void LookBehindLines(const Model<double>& model, long k, double t,
+                       const std::vector<ActiveContact>& contacts);
+
   JointWatch joints_;
   CoordinateWatch coordinates_;
   State<double> initial_;
+  std::vector<ActiveContact> last_contacts_;  // with lines, of the last step
+  std::string behind_;                        // the line about the first one that is behind
 };
 
 }  // namespace tangible

@@ -3,6 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <utility>
+#include <vector>
+
 #include "../../support/block_problem.h"
 #include "../../support/fit_scenes.h"
 
@@ -72,6 +76,68 @@ TEST(MinimiseTest, TheLimitOfIterationsIsKept) {
   EXPECT_EQ(minimum.status, FitStatus::kNotConverged);
   EXPECT_EQ(minimum.iterations.size(), 3u);
   EXPECT_EQ(minimum.message, "the limit of 2 iterations is reached before the minimum");
+}
+
+/// A problem of one parameter with one residual, and the values at which it was evaluated.
+class OneResidual : public LeastSquaresProblem {
+ public:
+  /// Returns the residual and its derivative.
+  using Function = std::pair<double, double> (*)(double);
+  OneResidual(double initial, bool logarithmic, Function function) : function_(function) {
+    entries_ = {{"x", initial, -kInfinity, kInfinity, logarithmic, 1.0}};
+  }
+  const std::vector<ParameterEntry>& entries() const override { return entries_; }
+  int num_shared() const override { return 1; }
+  int num_blocks() const override { return 1; }
+  int num_own(int /*block*/) const override { return 0; }
+  int num_rows(int /*block*/) const override { return 1; }
+  std::vector<RowPlace> Places(int /*block*/) const override { return {{0, 0.0}}; }
+  bool EvaluateBlock(int /*block*/, const Eigen::VectorXd& p, GradientMethod /*method*/,
+                     BlockDerivatives /*derivatives*/, BlockEvaluation* evaluation) override {
+    seen.push_back(p[0]);
+    const auto [residual, derivative] = function_(p[0]);
+    evaluation->residuals = Eigen::VectorXd::Constant(1, residual);
+    evaluation->jacobian = RowMatrixXd::Constant(1, 1, derivative);
+    return true;
+  }
+  std::vector<double> seen;
+
+ private:
+  Function function_;
+  std::vector<ParameterEntry> entries_;
+};
+
+// From 4 the first step leads beyond 0, where the cost is less and nothing has an effect.
+TEST(MinimiseTest, AStepToWhereNothingHasAnEffectIsTakenBack) {
+  OneResidual problem(4.0, false, [](double x) {
+    const double root = std::sqrt(std::max(x + 0.01, 0.0));
+    return root > 0.0 ? std::pair(10.0 * root - 2.0, 5.0 / root) : std::pair(5.0, 0.0);
+  });
+  const Minimum minimum = Minimise(
+      {}, Eigen::VectorXd::Constant(1, 4.0), [] { return 0.0; }, {}, &problem);
+  EXPECT_EQ(minimum.status, FitStatus::kConverged) << minimum.message;
+  EXPECT_NEAR(minimum.parameters[0], 0.03, 1e-9);
+}
+
+TEST(MinimiseTest, WhereNothingHasAnEffectIsNoMinimum) {
+  OneResidual problem(1.0, false, [](double) { return std::pair(5.0, 0.0); });
+  const Minimum minimum = Minimise(
+      {}, Eigen::VectorXd::Constant(1, 1.0), [] { return 0.0; }, {}, &problem);
+  EXPECT_EQ(minimum.status, FitStatus::kNotConverged);
+  EXPECT_NE(minimum.message.find("no parameter has an effect"), std::string::npos)
+      << minimum.message;
+}
+
+// A model may take minutes for values that are wrong by orders of magnitude.
+TEST(MinimiseTest, ALogarithmChangesByAFactorOf33AtMost) {
+  OneResidual problem(1.0, true, [](double x) { return std::pair(std::log(x) - 12.0, 1.0 / x); });
+  const Minimum minimum = Minimise(
+      {}, Eigen::VectorXd::Constant(1, 1.0), [] { return 0.0; }, {}, &problem);
+  EXPECT_EQ(minimum.status, FitStatus::kConverged) << minimum.message;
+  EXPECT_NEAR(std::log(minimum.parameters[0]), 12.0, 1e-9);
+  for (size_t i = 1; i < problem.seen.size(); ++i) {
+    EXPECT_LT(problem.seen[i], 34.0 * problem.seen[i - 1]);
+  }
 }
 
 /// r = (x, −1 + 0.45 x²) / σ, whose minimum is far from zero: near x = 0 a Gauss-Newton step goes a

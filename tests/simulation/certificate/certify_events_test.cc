@@ -304,5 +304,50 @@ TEST(CertifyEventsTest, ADiscAtTheEndOfAFaceAtTheStartIsOneSided) {
   EXPECT_EQ(CertificateFor(disc(0.0), {"bodies/disc/velocity/x"}).verdict, "trustworthy");
 }
 
+// At rest above the end it stays on one side and tips over on the other, whatever moves it.
+TEST(CertifyEventsTest, ADiscAtRestAboveACornerIsOneSided) {
+  const char disc[] = R"("bodies": [{"name": "disc", "shape": {"circle": {"radius": 0.25}},
+      "mass": 1, "position": [0, 0.25]}, {"name": "ledge", "static": true,
+      "shape": {"box": {"size": [10, 0.5]}}, "position": [-5, -0.25]}])";
+  for (const char* path : {"bodies/disc/position/x", "bodies/disc/velocity/x"}) {
+    EXPECT_EQ(CertificateFor(disc, {path})
+                  .verdict.find("one-sided: contact of disc and ledge is at the end of a face"),
+              0u)
+        << path << ": " << CertificateFor(disc, {path}).verdict;
+  }
+  EXPECT_EQ(CertificateFor(disc, {"bodies/disc/mass"}).verdict, "trustworthy");
+}
+
+// A slider whose motor reaches its speed as it meets its limit: faster it would still be driven
+// there. It matters in which order both come, whatever the restitution.
+TEST(CertifyEventsTest, AnImpactAsAMotorReachesItsSpeedIsAKink) {
+  const auto slider = [](const char* limit) {
+    return std::string(R"("gravity": [0, 0], "bodies": [{"name": "b", "mass": 1, "inertia": 0.01,
+        "position": [0, 0]}], "joints": [{"name": "j", "type": "prismatic",
+        "bodies": ["b", "world"], "anchor": [0, 0], "axis": [1, 0], "limits": [-1, )") +
+           limit + R"(], "restitution": 1, "motor": {"speed": 1, "limit": 40}}])";
+  };
+  EXPECT_NE(CertificateFor(slider("0.0125"), {"joints/j/motor/speed"})
+                .verdict.find("an impact as a contact stops sliding"),
+            std::string::npos)
+      << CertificateFor(slider("0.0125"), {"joints/j/motor/speed"}).verdict;
+  EXPECT_EQ(CertificateFor(slider("0.02"), {"joints/j/motor/speed"}).verdict, "trustworthy");
+}
+
+// Joint friction that is exactly at its limit beside a motor that turns: the motor's force is
+// determined, so that friction has no other share.
+TEST(CertifyEventsTest, FrictionAtItsLimitBesideAMotorIsAKink) {
+  const auto slider = [](const char* effort) {
+    return std::string(R"("gravity": [0, 0], "bodies": [{"name": "b", "mass": 1, "inertia": 0.01,
+        "position": [0, 0]}], "joints": [{"name": "j", "type": "prismatic",
+        "bodies": ["b", "world"], "anchor": [0, 0], "axis": [1, 0], "friction": 1,
+        "effort": )") +
+           effort + R"(, "motor": {"speed": 1, "limit": 2}}])";
+  };
+  EXPECT_EQ(CertificateFor(slider("-1"), {"joints/j/motor/limit"}).verdict.find("near a kink"), 0u)
+      << CertificateFor(slider("-1"), {"joints/j/motor/limit"}).verdict;
+  EXPECT_EQ(CertificateFor(slider("-1.5"), {"joints/j/motor/limit"}).verdict, "trustworthy");
+}
+
 }  // namespace
 }  // namespace tangible
