@@ -137,7 +137,7 @@ Certificate RolloutWorker::Certify(const RolloutInput& input, const std::vector<
   names.insert(names.end(), outputs.begin(), outputs.begin() + states);
   const RowMatrixXd directions = VariableDirections(of_parameters, of_states);
   if (f_.num_controls() == 0) {
-    return CertifyDerivative(model_, initial_, directions, names, sizes);
+    return WithoutIdleKinks(input, CertifyDerivative(model_, initial_, directions, names, sizes));
   }
   CertifyOptions options{controls_.numbers, directions, names};
   for (int i = 0; i < f_.structure_->num_parameters; ++i) {

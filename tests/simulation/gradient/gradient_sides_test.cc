@@ -453,5 +453,35 @@ TEST(GradientSidesTest, AWindowsEdgeWhereItsOwnSignalSteps) {
   }
 }
 
+// A brake that holds exactly as much as it can: its limit has two sides. The mass has one
+// derivative, as nothing moves whatever it is.
+TEST(GradientSidesTest, AKinkOnWhichAParameterDoesNotActIsNone) {
+  const Scene scene = SceneOf(R"({"gravity": [0, 0], "bodies": [
+      {"name": "b", "mass": 1, "inertia": 0.01, "position": [0, 0]}],
+      "joints": [{"name": "j", "type": "prismatic", "bodies": ["b", "world"], "anchor": [0, 0],
+                  "axis": [1, 0], "effort": 2, "motor": {"speed": 0, "limit": 2}}],
+      "simulation": {"dt": 0.01, "duration": 0.2, "stepping": "event"}})");
+  const auto verdict = [&](const char* path) {
+    return FinalStateJacobian(scene, testing::Resolve(scene, {path}), {}).certificate.verdict;
+  };
+  EXPECT_EQ(verdict("bodies/b/mass"), "trustworthy");
+  EXPECT_EQ(verdict("joints/j/motor/limit").find("near a kink"), 0u)
+      << verdict("joints/j/motor/limit");
+}
+
+// A ball that falls without gravity touches the floor without load after an inelastic impact.
+TEST(GradientSidesTest, AContactWithoutLoadIsNoKinkOfWhatSlidesAlong) {
+  const Scene scene = SceneOf(R"({"gravity": [0, 0], "bodies": [
+      {"name": "b", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0, 1.1],
+       "velocity": [0.5, -2]},
+      {"name": "floor", "static": true, "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
+      "simulation": {"dt": 0.01, "duration": 0.9, "stepping": "event"}})");
+  const GradientResult result = FinalStateJacobian(
+      scene, testing::Resolve(scene, {"bodies/b/velocity/x", "bodies/b/velocity/y"}), {});
+  EXPECT_EQ(result.certificate.verdict, "trustworthy");
+  EXPECT_NEAR(result.jacobian(0, 0), 0.9, 1e-9);
+  EXPECT_NEAR(result.jacobian(1, 1), 0.0, 1e-9);
+}
+
 }  // namespace
 }  // namespace tangible

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 #include <string>
 #include <vector>
 
@@ -232,6 +233,40 @@ TEST(PolylineTest, ACornerThatIsCaughtInAValleyIsAPivot) {
   EXPECT_NEAR(run.final.twist[2], -std::sqrt(left), 2e-6);  // the integrator's error
   ExpectAllAgree(scene, {"bodies/b/position/x", "bodies/b/shape/size/x", "bodies/b/friction",
                          "bodies/ground/shape/points/1/x"});
+}
+
+// A ball that leaves the end of a slope, where its foot passes from the slope to the end without an
+// impact: the time of that has a derivative, v_d² = v² − 2 g d sin α at the end.
+TEST(PolylineTest, TheTimeOfLeavingASlopeHasADerivative) {
+  for (const double degrees : {30.0, 45.0, -20.0, 0.0}) {
+    SCOPED_TRACE(degrees);
+    const double slope = degrees * std::numbers::pi / 180.0;
+    const double sine = std::sin(slope);
+    const double cosine = std::cos(slope);
+    const auto at = [](double x, double y) { return "[" + Text(x) + ", " + Text(y) + "]"; };
+    // 0.5 m before the end at the origin.
+    const Scene scene =
+        On(DiscWith(R"("position": )" + at(-0.5 * cosine - 0.1 * sine, -0.5 * sine + 0.1 * cosine) +
+                    R"(, "velocity": )" + at(4.0 * cosine, 4.0 * sine)),
+           R"("polyline": {"points": [)" + at(-2.0 * cosine, -2.0 * sine) +
+               R"(, [0, 0]], "solid": "right"})",
+           "event", 0.4, 0.0);
+    const GradientResult result = ExpectAllAgree(scene, {"bodies/b/velocity/x"});
+    const double leaves = std::sqrt(16.0 - 2.0 * kGravity * 0.5 * sine);
+    EXPECT_NEAR(result.jacobian(3, 0), cosine * cosine * 4.0 / leaves, 1e-8);
+  }
+}
+
+// A disc that falls beside a bowl, past its end, is not in what is solid behind it.
+TEST(PolylineTest, WhatFallsBesideABowlFalls) {
+  const char bowl[] = R"("polyline": {"points": [[-1, 0.5], [-0.5, 0.125], [0, 0], [0.5, 0.125],
+                                                 [1, 0.5]], "solid": "right"})";
+  for (const char* stepping : {"fixed", "event"}) {
+    const RolledOnPolyline run =
+        RollOnPolyline(On(DiscWith(R"("position": [1.5, 1])"), bowl, stepping, 0.8));
+    EXPECT_NEAR(run.final.pose[1], 1.0 - 0.5 * kGravity * 0.64, 0.05);
+    EXPECT_NEAR(run.final.twist[1], -kGravity * 0.8, 1e-9);
+  }
 }
 
 // The first point of a closed outline, which its last edge reads too.
