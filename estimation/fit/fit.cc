@@ -111,9 +111,8 @@ void LeaveOutRounding(const Eigen::VectorXd& p, const std::vector<ParameterEntry
   double largest = 0.0;
   for (Eigen::Index k = 0; k < all.size(); ++k) largest = std::max(largest, effect_of(k));
   for (Eigen::Index k = 0; k < all.size(); ++k) {
-    if (!(effect_of(k) < kMayBeRounding)) continue;
-    bool is_rounding = effect_of(k) < kRoundingBeside * largest;
-    if (!is_rounding) {
+    bool is_rounding = effect_of(k) < std::min(kRoundingBeside * largest, kNotSeen);
+    if (!is_rounding && effect_of(k) < kMayBeRounding) {
       const ParameterEntry& entry = entries[static_cast<size_t>(k)];
       const double step = kBesideStep * std::max(std::abs(p[k]), entry.scale);
       Eigen::VectorXd beside = p;

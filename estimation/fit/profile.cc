@@ -220,20 +220,23 @@ class Profiler {
   Profile profile_;
 };
 
-/// Whether the cost at both ends of the interval, along the direction in which the others follow,
-/// rises as a parabola does.
-bool IsParabola(const FitOptions& options, const FitResult& result, int k,
-                LeastSquaresProblem* problem, long* rollouts) {
+constexpr char kNoParabola[] = "the cost across the interval is no parabola";
+constexpr char kNoRunThere[] = "the model cannot be run across the interval";
+
+/// Empty where the cost at both ends of the interval, along the direction in which the others
+/// follow, rises as a parabola does; else why not.
+std::string WhyNoParabola(const FitOptions& options, const FitResult& result, int k,
+                          LeastSquaresProblem* problem, long* rollouts) {
   const Uncertainty& u = result.uncertainty;
   // How the others follow is known only where all are determined.
   if (k >= u.covariance.rows() || !(u.covariance(k, k) > 0.0) || !u.covariance.allFinite()) {
-    return true;
+    return "";
   }
   const std::vector<ParameterEntry>& entries = problem->entries();
   const double rise = ProfileRise(u, k);
   const double length = std::sqrt(2.0 * rise / u.covariance(k, k));
   Linearizer linearizer(problem, options.derivatives, options.threads, nullptr);
-  bool parabola = true;
+  std::string why;
   for (const double side : {-1.0, 1.0}) {
     Eigen::VectorXd p = result.estimate;
     for (Eigen::Index i = 0; i < u.covariance.rows(); ++i) {
@@ -243,12 +246,13 @@ bool IsParabola(const FitOptions& options, const FitResult& result, int k,
     double cost = 0.0;
     const bool done =
         linearizer.Cost(ToInternal(entries, p), {options.huber, options.huber}, &blocks, &cost);
-    parabola = parabola && done && cost - result.final_cost < rise * kParabola &&
-               cost - result.final_cost > rise / kParabola;
-    if (!parabola) break;
+    const double risen = cost - result.final_cost;
+    const bool parabola = risen < rise * kParabola && risen > rise / kParabola;
+    why = !done ? kNoRunThere : parabola ? "" : kNoParabola;
+    if (!why.empty()) break;
   }
   *rollouts += linearizer.rollouts();
-  return parabola;
+  return why;
 }
 
 }  // namespace
@@ -384,8 +388,9 @@ std::vector<std::pair<int, std::string>> NeedProfiles(const FitOptions& options,
       proposed.emplace_back(k, "the certificate names a kink");
     } else if (meets(result.uncertainty.DoesNotFit() ? robust : trusting) || meets(robust)) {
       proposed.emplace_back(k, "the interval meets a bound");
-    } else if (!IsParabola(options, result, k, problem, rollouts)) {
-      proposed.emplace_back(k, "the cost across the interval is no parabola");
+    } else if (const std::string why = WhyNoParabola(options, result, k, problem, rollouts);
+               !why.empty()) {
+      proposed.emplace_back(k, why);
     }
   }
   proposed.resize(std::min(proposed.size(), kMostProfiles));

@@ -14,8 +14,10 @@ inline constexpr double kNoEffect = 1e-12;
 /// its magnitude.
 inline constexpr double kMayBeRounding = 1e-7;
 inline constexpr double kBesideStep = 1e-6;
-/// Of the largest effect of a parameter: the smaller ones of that kind are rounding.
+/// Of the largest effect of a parameter, as long as it is below kNotSeen of sigma too: smaller ones
+/// are rounding.
 inline constexpr double kRoundingBeside = 1e-10;
+inline constexpr double kNotSeen = 1e-3;
 inline constexpr double kChangesAsRounding = 1e-3;
 /// Of 1: the most by which a step may change the logarithm of a parameter, a factor of 33: beyond,
 /// a model may take minutes for a run that says nothing.

@@ -2,6 +2,8 @@
 //
 // Simulations that go on a step at a time, as many as there are rows: each row has its own
 // parameters, state and stepper, and the steps are those of a long run, bit for bit.
+#include <unistd.h>
+
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -27,7 +29,10 @@ class Simulation {
  public:
   Simulation(const Scene& scene, const std::vector<std::string>& parameters,
              const std::vector<std::string>& controls, py::ssize_t rows, int threads)
-      : scene_(scene), pool_(NumThreads(threads)), rows_(static_cast<size_t>(rows)) {
+      : scene_(scene),
+        threads_(NumThreads(threads)),
+        pool_(std::make_unique<WorkerPool>(threads_)),
+        rows_(static_cast<size_t>(rows)) {
     SimulationSettings& settings = scene_.simulation;
     settings.duration = std::max(settings.duration, settings.dt * kEndlessSteps);
     // Of one record: the endless run must not be counted step by step.
@@ -35,6 +40,12 @@ class Simulation {
     if (!error.empty()) throw Error((scene.path.empty() ? "" : scene.path + ": ") + error);
     structure_ = BuildStructure(scene_);
   }
+
+  ~Simulation() {
+    if (getpid() != process_) static_cast<void>(pool_.release());
+  }
+  Simulation(const Simulation&) = delete;
+  Simulation& operator=(const Simulation&) = delete;
 
   const RolloutFunction& function() const { return function_; }
 
@@ -78,7 +89,34 @@ class Simulation {
   }
 
   // The states of all rows (rows x S); NaN where a row has not been started or has failed.
-  Array States() const {
+  Array States() {
+    return Alone([&] { return StatesNow(); });
+  }
+  // Of each row the contacts that carried an impulse in its last step: both bodies, and the normal
+  // impulse (N s).
+  std::vector<std::vector<std::tuple<int, int, double>>> Touches() {
+    return Alone([&] { return TouchesNow(); });
+  }
+  std::vector<long> StepsDone() {
+    return Alone([&] {
+      std::vector<long> steps;
+      for (const Row& row : rows_) steps.push_back(row.steps);
+      return steps;
+    });
+  }
+
+ private:
+  // While no other thread steps or resets.
+  template <typename Read>
+  auto Alone(const Read& read) -> decltype(read()) {
+    py::gil_scoped_release unlocked;
+    return turns_.Take([&] {
+      py::gil_scoped_acquire locked;
+      return read();
+    });
+  }
+
+  Array StatesNow() const {
     const py::ssize_t size = function_.num_states();
     Array array({static_cast<py::ssize_t>(rows_.size()), size});
     for (size_t i = 0; i < rows_.size(); ++i) {
@@ -93,9 +131,7 @@ class Simulation {
     return array;
   }
 
-  // Of each row the contacts that carried an impulse in its last step: both bodies, and the normal
-  // impulse (N s).
-  std::vector<std::vector<std::tuple<int, int, double>>> Touches() const {
+  std::vector<std::vector<std::tuple<int, int, double>>> TouchesNow() const {
     std::vector<std::vector<std::tuple<int, int, double>>> touches(rows_.size());
     for (size_t i = 0; i < rows_.size(); ++i) {
       if (rows_[i].stepper == nullptr || rows_[i].failed || rows_[i].steps == 0) continue;
@@ -110,18 +146,11 @@ class Simulation {
     return touches;
   }
 
-  std::vector<long> StepsDone() const {
-    std::vector<long> steps;
-    for (const Row& row : rows_) steps.push_back(row.steps);
-    return steps;
-  }
-
- private:
   struct Row {
     Model<double> model;
     State<double> state;
     std::unique_ptr<Stepper> stepper;
-    std::vector<double> parameters;
+    std::vector<double> controls;  ///< the scene's own, of each number of a control
     long steps = 0;
     bool failed = false;
   };
@@ -133,13 +162,20 @@ class Simulation {
   }
 
   void ForEach(size_t count, const std::function<void(size_t)>& work) {
-    pool_.Run(count, count < 2 ? 1 : pool_.threads(), [&](size_t i, int) { work(i); });
+    // A process that has been forked off has no threads of its parent's, nor can it end them.
+    if (getpid() != process_) {
+      process_ = getpid();
+      static_cast<void>(pool_.release());
+      pool_ = std::make_unique<WorkerPool>(threads_);
+    }
+    pool_->Run(count, count < 2 ? 1 : pool_->threads(), [&](size_t i, int) { work(i); });
   }
 
   std::string ResetRow(Row* row, const double* parameters, const double* state) const {
     Scene scene = scene_;
     if (function_.num_parameters() > 0) {
-      std::string error = SetParameters(function_.parameters(), parameters, &scene);
+      const Eigen::Map<const VectorX<double>> values(parameters, function_.num_parameters());
+      std::string error = function_.SetOn(values, &scene);
       if (!error.empty()) {
         row->failed = true;
         return error;
@@ -148,6 +184,10 @@ class Simulation {
     State<double> own;
     BuildModelWithStructure(scene, structure_, &row->model, &own);
     row->state = own;
+    row->controls.clear();
+    for (const int number : function_.control_numbers()) {
+      row->controls.push_back(row->model.parameters[static_cast<size_t>(number)]);
+    }
     row->steps = 0;
     row->failed = false;
     if (state != nullptr) {
@@ -167,8 +207,13 @@ class Simulation {
     if (row->stepper == nullptr || row->failed) return "expected a reset before a step";
     const std::vector<int>& numbers = function_.control_numbers();
     for (size_t j = 0; j < numbers.size(); ++j) {
-      const double value = controls[function_.control_of_number()[j]];
-      if (!std::isfinite(value)) return "action: expected finite numbers";
+      const int control = function_.control_of_number()[j];
+      const bool is_left = std::isnan(controls[control]) && function_.LeavesControl(control);
+      const double value = is_left ? row->controls[j] : controls[control];
+      if (!std::isfinite(value)) {
+        row->failed = true;
+        return "action: expected finite numbers";
+      }
       row->model.parameters[static_cast<size_t>(numbers[j])] = value;
     }
     const SimulationSettings& settings = scene_.simulation;
@@ -188,7 +233,9 @@ class Simulation {
   Scene scene_;
   RolloutFunction function_;
   std::shared_ptr<const ModelStructure> structure_;
-  WorkerPool pool_;
+  int threads_;
+  pid_t process_ = getpid();
+  std::unique_ptr<WorkerPool> pool_;
   Turns turns_;
   std::vector<Row> rows_;
 };

@@ -97,3 +97,16 @@ def test_fits_warn_of_their_certificate() -> None:
                          "advice": "", "discrete_map": False, "margin_where": ""}}, "")
     assert result.warnings[0] == "few data"
     assert result.warnings[1].startswith("not trustworthy at the estimate: near a kink")
+
+
+def test_what_fails_has_no_derivative_to_trust() -> None:
+    scene = tangible.Scene(simulation={"dt": 0.01, "duration": 1.0})
+    scene.add_body("b", mass=1, inertia=1, position=[0, 0], velocity=[1e300, 0], linear_damping=-0.0)
+    scene.add_force("push", body="b", force=[1e308, 0])
+    rollout = tangible.Rollout(scene, ["bodies/b/mass"])
+    with pytest.raises(tangible.TangibleError):
+        rollout([1e-3])
+    found = rollout.certificate([1e-3])
+    assert not found and found.kind == "discontinuous" and "the run fails" in found["verdict"]
+    refused = rollout.certificates([[-1.0]])[0]
+    assert not refused and "there is no run: bodies/b/mass: expected a number > 0" in refused["verdict"]

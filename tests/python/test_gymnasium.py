@@ -151,6 +151,22 @@ def test_bricks_that_are_hit_are_gone(adapter: Any) -> None:
     assert env.step([0.0])[4]["bricks"] == 12
 
 
+def test_breakout_keeps_what_was_drawn_and_counts_every_touch(adapter: Any) -> None:
+    mass = "bodies/paddle/mass"
+    hits = {}
+    for steps in (1, 5):
+        env = adapter.breakout(noise=None, steps=steps, domains={mass: [5.0]})
+        env.reset(seed=0)
+        reward = 0.0
+        for _ in range(150 // steps):
+            reward += env.step([0.0])[1]
+            if env.simulation.parameters:
+                assert env.simulation.set_parameters[0].tolist() == [5.0]
+        assert env.simulation.parameters == [mass]
+        hits[steps] = reward
+    assert hits[1] == hits[5] > 0
+
+
 def test_a_scene_of_ones_own(adapter: Any) -> None:
     env = adapter.SceneEnv(
         ball(duration=0.1), ["forces/push/force/x"], low=-1, high=1,

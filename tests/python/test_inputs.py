@@ -187,3 +187,21 @@ def test_bodies_and_joints_to_look_at() -> None:
     assert not built.springs
     with pytest.raises(TypeError):
         built.bodies["ball"]["mass"] = 2.0  # type: ignore[index]
+
+
+def test_frames_go_by_the_names_of_their_columns() -> None:
+    pandas = pytest.importorskip("pandas")
+    masses = ["bodies/a/mass", "bodies/b/mass"]
+    scene = tangible.Scene(simulation={"dt": 0.1, "duration": 1.0}, gravity=[0, 0])
+    for name in "ab":
+        scene.add_body(name, mass=1, inertia=1, position=[0, 0])
+        scene.add_force(f"f{name}", body=name, force=[1, 0])
+    rollout = tangible.Rollout(scene, masses)
+    frame = pandas.DataFrame({"bodies/b/mass": [2.0, 4.0], "bodies/a/mass": [1.0, 1.0]})
+    assert np.array_equal(rollout(frame), rollout([[1.0, 2.0], [1.0, 4.0]]))
+    assert np.array_equal(rollout(frame.iloc[0]), rollout([1.0, 2.0]))
+    with pytest.raises(ValueError, match="expected one of bodies/a/mass, bodies/b/mass, got 'foo'"):
+        rollout(pandas.DataFrame({"foo": [1.0], "bodies/a/mass": [1.0]}))
+    pushed = tangible.Rollout(scene, [], ["forces/fa/force/x", "forces/fb/force/x"])
+    controls = pandas.DataFrame({"forces/fb/force/x": [2.0] * 10, "forces/fa/force/x": [1.0] * 10})
+    assert np.array_equal(pushed(controls=controls), pushed(controls=np.tile([1.0, 2.0], (10, 1))))

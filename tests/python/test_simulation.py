@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import time
 from pathlib import Path
 
@@ -140,3 +142,78 @@ def test_a_step_is_cheap() -> None:
         return (time.process_time() - start) / 500
 
     assert min(seconds() for _ in range(5)) < 60e-6
+
+
+def two_bodies() -> tangible.Scene:
+    """Two bodies that fall from different heights, each with a force of its own."""
+    scene = tangible.Scene(simulation={"stepping": "event", "dt": 0.1, "duration": 1.0})
+    for name, y, force in (("a", 0.0, 3.0), ("b", 1.0, 1.0)):
+        scene.add_body(name, mass=1, inertia=1, position=[0, y])
+        scene.add_force(f"f{name}", body=name, force=[force, 0])
+    return scene
+
+
+def test_what_is_left_out_stays_as_it_is_where_the_numbers_of_a_path_differ() -> None:
+    heights, forces = "bodies/*/position/y", "forces/f*/force/x"
+    fallen = -0.5 * 9.81
+    simulation = tangible.Simulation(two_bodies(), [forces], parameters=[heights, "bodies/a/velocity/x"])
+    assert simulation.reset()[[1, 7]].tolist() == [0.0, 1.0]
+    assert simulation.step(steps=10)[[0, 1, 6, 7]] == pytest.approx([1.5, fallen, 0.5, 1.0 + fallen])
+    assert simulation.reset(parameters={heights: 2.0})[[1, 7]].tolist() == [2.0, 2.0]
+    assert simulation.step([2.0], steps=10)[[0, 6]] == pytest.approx([1.0, 1.0])
+    assert simulation.reset(parameters={"bodies/a/velocity/x": 1.0})[[1, 7]].tolist() == [0.0, 1.0]
+    assert simulation.step(steps=10)[[0, 6]] == pytest.approx([2.5, 0.5])
+    rollout = tangible.Rollout(two_bodies(), [heights, "bodies/a/velocity/x"], [forces])
+    assert np.isnan(rollout.default_parameters[0])
+    for given in (None, {"bodies/a/velocity/x": 0.0}, rollout.default_parameters):
+        assert rollout(given)[[1, 7]] == pytest.approx([fallen, 1.0 + fallen])
+    # The value of one of them is set like any other.
+    assert rollout([0.0, 0.0])[[1, 7]] == pytest.approx([fallen, fallen])
+    assert rollout([[0.0, 0.0], [1e-9, 0.0]])[:, 7] == pytest.approx([fallen, fallen])
+    assert rollout([5.0, 0.0])[[1, 7]] == pytest.approx([5.0 + fallen] * 2)
+    assert rollout()[[0, 6]] == pytest.approx([1.5, 0.5])  # the last call has left nothing
+    with pytest.raises(tangible.TangibleError, match="velocity/x: expected a finite number, got NaN"):
+        rollout([0.0, np.nan])
+
+
+def test_rows_by_a_mask() -> None:
+    simulation = tangible.Simulation(ball(), batch=3)
+    simulation.reset()
+    simulation.step(steps=5)
+    simulation.reset(rows=np.array([True, False, True]))
+    assert simulation.steps.tolist() == [0, 5, 0]
+    simulation.reset(rows=[1])
+    assert simulation.steps.tolist() == [0, 0, 0]
+    with pytest.raises(ValueError, match="a mask of 3 truth values, got 2"):
+        simulation.reset(rows=[True, False])
+    with pytest.raises(TypeError, match="rows: expected whole numbers, got True"):
+        simulation.reset(rows=[True, 1, 2])
+
+
+def test_an_action_that_is_no_number_fails_its_row() -> None:
+    simulation = tangible.Simulation(ball(), [PUSH], batch=2, on_failure="nan")
+    simulation.reset()
+    states = simulation.step([[np.nan], [1.0]])
+    assert np.isnan(states[0]).all() and np.isfinite(states[1]).all()
+    assert np.isnan(simulation.step([[1.0], [1.0]])[0]).all()
+    simulation.reset(rows=[0])
+    assert np.isfinite(simulation.step([[1.0], [1.0]])).all()
+
+
+def test_a_process_that_is_forked_off_goes_on() -> None:
+    simulation = tangible.Simulation(ball(), batch=4, threads=2)
+    simulation.reset()
+    simulation.step(steps=2)
+    child = os.fork()
+    if child == 0:
+        simulation.step(steps=2)
+        os._exit(7 if simulation.steps.tolist() == [4] * 4 else 8)
+    end = time.monotonic() + 20.0
+    done, status = 0, 0
+    while not done and time.monotonic() < end:
+        done, status = os.waitpid(child, os.WNOHANG)
+        time.sleep(0.01)
+    if not done:
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+    assert done and os.WEXITSTATUS(status) == 7

@@ -79,6 +79,19 @@ def unmasked(values: Any) -> NDArray[Any]:
     return array
 
 
+def named(values: Any) -> Mapping[str, Any] | None:
+    """The columns of a DataFrame, or the values of a Series, by their names, where these are texts;
+    None of anything else. pandas is not imported for that."""
+    labels = getattr(values, "columns", None)
+    if labels is None:
+        labels = getattr(values, "index", None)
+    if labels is None or callable(labels) or not hasattr(values, "to_numpy"):
+        return None
+    if not all(isinstance(label, str) for label in labels):
+        return None
+    return {str(label): np.asarray(values[label]) for label in labels}
+
+
 def paths(values: Sequence[str], name: str) -> list[str]:
     """The paths as a list; one string alone, of which each letter would be a path, is refused."""
     if isinstance(values, str):
@@ -99,6 +112,8 @@ def integers(values: Iterable[int], name: str) -> list[int]:
     found = []
     for value in values:
         try:
+            if isinstance(value, (bool, np.bool_)):
+                raise TypeError
             found.append(operator.index(value))
         except TypeError:
             raise TypeError(f"{name}: expected whole numbers, got {said(value)}") from None

@@ -293,7 +293,8 @@ def _events(columns: Mapping[str, NDArray[Any]], where: str) -> str:
     expected = ("time", "event", "number")
     if set(columns) != set(expected):
         raise ValueError(f"{where}: expected the columns {', '.join(expected)}, got {', '.join(columns)}")
-    if not np.isfinite(columns["number"]).all():
+    numbers = columns["number"]
+    if not (np.isfinite(numbers) & (numbers == np.floor(numbers))).all():
         raise ValueError(f"{where}: number: expected 1, 2, ... for the first, second, ... event of its name")
     rows = [
         f"{float(time):.17g},{event},{int(number)}"
@@ -315,9 +316,11 @@ def observation_files(table: Any, scene: Scene | None, points: Sequence[str], wh
         if "event" in columns:
             return [_events(columns, where)]
         also = [key for key in ("relative_to",) if key in columns]
-        for owner in _OWNERS:
-            if owner in columns:
-                return [_text(owner, list(columns[owner]), columns, also)]
+        owners = [owner for owner in _OWNERS if owner in columns]
+        if len(owners) > 1:
+            raise ValueError(f"{where}: expected one column {', '.join(_OWNERS)}, got {', '.join(owners)}")
+        for owner in owners:
+            return [_text(owner, list(columns[owner]), columns, also)]
         moving = [
             name for name, body in (scene.bodies.items() if scene is not None else ())
             if not body.get("static") and not body.get("kinematic")

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _core, _executor
 from ._certificate import Certificate
-from ._plain import choice, flag, integers, masked, number, paths, said, seed_of, whole
+from ._plain import choice, flag, integers, masked, named, number, paths, said, seed_of, whole
 from ._scene import Scene, SceneLike
 
 Floats = NDArray[np.float64]
@@ -105,7 +105,7 @@ def floats(values: ArrayLike, name: str) -> Floats:
 
 
 def finite(
-    values: Floats | None, name: str, names: Sequence[str], batched: bool
+    values: Floats | None, name: str, names: Sequence[str], batched: bool, own: Floats | None = None
 ) -> None:
     """Refuses NaN and infinite numbers, in the words of a row that the engine refuses.
 
@@ -114,10 +114,16 @@ def finite(
         name: Of the argument, with a blank behind it where it is said.
         names: Of the last axis.
         batched: Whether the caller knows of rows.
+        own: The scene's own values; where they are NaN (those of a path differ), NaN leaves them.
     """
     if values is None or np.isfinite(values).all():
         return
-    at = np.argwhere(~np.isfinite(values))[0]
+    bad = ~np.isfinite(values)
+    if own is not None:
+        bad &= ~(np.isnan(values) & np.isnan(own))
+    if not bad.any():
+        return
+    at = np.argwhere(bad)[0]
     found = values[tuple(at)]
     got = "NaN" if np.isnan(found) else "Infinity" if found > 0 else "-Infinity"
     row = f"row {at[0]}: " if batched else ""
@@ -160,8 +166,9 @@ def _array(
     values: Numbers, name: str, names: Sequence[str], base: Floats
 ) -> Floats:
     """An array of the shape of `base`, or with one more, leading axis."""
-    if isinstance(values, Mapping):
-        return _by_name(values, name, names, base)
+    by_name = values if isinstance(values, Mapping) else named(values)
+    if by_name is not None:
+        return _by_name(by_name, name, names, base)
     array = floats(values, name)
     if array.ndim not in (base.ndim, base.ndim + 1):
         raise ValueError(
@@ -246,7 +253,8 @@ class Rollout:
 
     @property
     def default_parameters(self) -> Floats:
-        """The scene's own values, shape (P,)."""
+        """The scene's own values, shape (P,); NaN where the numbers of a path differ, which as an
+        argument leaves them as they are."""
         return np.array(self._defaults[0][0])
 
     @property
@@ -296,9 +304,9 @@ class Rollout:
             return
         # Names are made where they are said: the engine makes a list of them at each look.
         if not all(values is None or np.isfinite(values).all() for values in (p, x, u)):
-            finite(p, "", self.parameters, batched)
+            finite(p, "", self.parameters, batched, self._defaults[0][0])
             finite(x, "initial_state ", self.outputs, batched)
-            finite(u, "controls ", self.controls, batched)
+            finite(u, "controls ", self.controls, batched, self._defaults[2][0])
 
     def _shape(self, states: Floats, batched: bool) -> Floats:
         shaped: Floats = states[:, 0] if self._single else states

@@ -81,7 +81,8 @@ class Simulation:
         self._threads = whole(threads, "threads", 0, MOST_THREADS)
         self._core = self._make()
         self._set = np.tile(self._rollout.default_parameters, (self._rows, 1))  # parameters of each row
-        self._own = np.array([read[path] for path in self.controls])
+        own = self._rollout.default_controls
+        self._own = own[0] if len(own) else np.array([read[path] for path in self.controls])
         self._noise = np.zeros(len(outputs))
         self._spread_of_parameters = np.zeros(len(names))
         for name, deviation in noise.items():
@@ -148,6 +149,12 @@ class Simulation:
         return self._rollout.parameters
 
     @property
+    def set_parameters(self) -> Floats:
+        """The parameters of the last reset of each row, shape (N, P); NaN: the scene's own, where
+        those of a path differ."""
+        return self._set.copy()
+
+    @property
     def state(self) -> Floats:
         """Shape (S,), or (N, S) of a batch; NaN before the first reset."""
         states = self._core.states()
@@ -191,6 +198,14 @@ class Simulation:
             raise ValueError(f"{name}: expected shape {(rows, *base.shape)}, got {array.shape}")
         return np.ascontiguousarray(np.broadcast_to(array, (rows, *base.shape)))
 
+    def _chosen(self, rows: Iterable[int]) -> list[int]:
+        found = list(rows) if isinstance(rows, Iterable) else rows
+        if isinstance(found, list) and found and all(isinstance(row, (bool, np.bool_)) for row in found):
+            if len(found) != self._rows:
+                raise ValueError(f"rows: expected a mask of {self._rows} truth values, got {len(found)}")
+            return [int(row) for row in np.flatnonzero(found)]
+        return integers(found, "rows")
+
     def reset(
         self,
         state: Numbers | None = None,
@@ -207,7 +222,8 @@ class Simulation:
             seed: Of `noise` and `domains` from now on, a whole number >= 0; absent: they go on.
             parameters: Shape (P,), or one for each row, or a dict; absent: drawn from `domains`, or
                 the scene's.
-            rows: Which of a batch; absent: all. The others keep their state.
+            rows: Which of a batch, by number or by a mask of N truth values; absent: all. The
+                others keep their state.
 
         Raises:
             TangibleError: A value that is not allowed.
@@ -215,7 +231,7 @@ class Simulation:
         """
         if seed is not None:
             self._generator = np.random.default_rng(seed_of(seed))
-        chosen = list(range(self._rows)) if rows is None else integers(rows, "rows")
+        chosen = list(range(self._rows)) if rows is None else self._chosen(rows)
         if any(not 0 <= row < self._rows for row in chosen):
             raise ValueError(f"rows: expected numbers from 0 to {self._rows - 1}, got {chosen}")
         count = len(chosen)
@@ -230,7 +246,7 @@ class Simulation:
             shape = (count, len(self.parameters))
             p = p + self._spread_of_parameters * self._generator.standard_normal(shape)
         if self.on_failure == "raise":
-            finite(p, "", self.parameters, self.batch is not None)
+            finite(p, "", self.parameters, self.batch is not None, own)
         self._set[chosen] = p
         x: Floats | None = None
         if state is not None:

@@ -106,13 +106,16 @@ class SceneEnv(gymnasium.Env):  # type: ignore[misc]
         )
         return self._look(state), {"state": state}
 
+    def _advance(self, action: Floats) -> Floats:
+        return self.simulation.step(action, steps=self._steps)
+
     def step(self, action: ArrayLike) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
         """(observation, reward, terminated, truncated, info with the `state`)."""
         clipped = np.clip(np.asarray(action, dtype=np.float64), self._low, self._high)
         before = self.simulation.state
         info: dict[str, Any] = {}
         try:
-            state = self.simulation.step(clipped, steps=self._steps)
+            state = self._advance(clipped)
         except TangibleError as error:
             # The last good state is the end; its reward is that of standing still.
             info["failure"] = str(error)
@@ -207,7 +210,7 @@ class _Breakout(SceneEnv):
         super().__init__(scene, controls, **settings)
         self._whole = self.simulation
         self._left = [body for body in scene.bodies if body.startswith("brick")]
-        self._noise = settings.get("noise")
+        self._hits = 0
 
     def reset(
         self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
@@ -216,17 +219,37 @@ class _Breakout(SceneEnv):
         self._left = [body for body in self._whole.scene.bodies if body.startswith("brick")]
         return super().reset(seed=seed, options=options)
 
+    def _advance(self, action: Floats) -> Floats:
+        self._hits = 0
+        state = self.simulation.state
+        for _ in range(self._steps):
+            state = self.simulation.step(action)
+            hit = {body for pair in self.simulation.touches[0] for body in pair} & set(self._left)
+            if hit:
+                self._hits += len(hit)
+                self._remove(hit, state)
+            if not self._left:
+                break
+        return state
+
+    def _remove(self, hit: set[str], state: Floats) -> None:
+        self._left = [body for body in self._left if body not in hit]
+        data = self.simulation.scene.to_dict()
+        data["bodies"] = [body for body in data["bodies"] if body["name"] not in hit]
+        # What was drawn for the episode stays.
+        values = {
+            path: value
+            for path, value in zip(self.simulation.parameters, self.simulation.set_parameters[0])
+            if not hit & set(path.replace(":", "/").split("/"))
+        }
+        self.simulation = Simulation(data, self.simulation.controls, parameters=list(values))
+        self.simulation.reset(state, parameters=np.array(list(values.values())))
+
     def step(self, action: ArrayLike) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
         observation, reward, ended, truncated, info = super().step(action)
-        hit = {body for pair in self.simulation.touches[0] for body in pair} & set(self._left)
-        if hit:
-            self._left = [body for body in self._left if body not in hit]
-            data = self.simulation.scene.to_dict()
-            data["bodies"] = [body for body in data["bodies"] if body["name"] not in hit]
-            self.simulation = Simulation(data, self.simulation.controls)
-            self.simulation.reset(info["state"])
         info["bricks"] = len(self._left)
-        return observation, reward + len(hit), ended or not self._left, truncated, info
+        hits = 0 if "failure" in info else self._hits
+        return observation, reward + hits, ended or not self._left, truncated, info
 
 
 def breakout(**keys: Any) -> SceneEnv:

@@ -8,6 +8,7 @@ is never left out. torch is imported with this module, not with `tangible`.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -171,6 +172,7 @@ class RolloutLayer(torch.nn.Module):
         on_failure: str = "raise",
     ) -> None:
         super().__init__()
+        parameters = paths(parameters, "parameters")
         self.function = _Rollout(scene, parameters, controls, records=records)
         self.kinks = kinks
         self.smoothing = smoothing
@@ -182,6 +184,9 @@ class RolloutLayer(torch.nn.Module):
         choice(on_failure, "on_failure", "raise", "nan")
         check_kinks(kinks, smoothing)
         start = torch.as_tensor(self.function.default_parameters)
+        for path, value in zip(self.function.parameters, start.tolist()):
+            if value != value:
+                raise ValueError(f"{path}: expected numbers of one value to start from, got some that differ")
         limits = dict(bounds or {})
         for name in [*(positive or []), *limits]:
             if name not in parameters:
@@ -211,9 +216,15 @@ class RolloutLayer(torch.nn.Module):
             pair = limits[path]
             if not isinstance(pair, (tuple, list)) or len(pair) != 2:
                 raise TypeError(f"bounds: {path}: expected (low, high), got {said(pair)}")
-            return float(pair[0]), float(pair[1])
+            return self._bound(pair[0], path), self._bound(pair[1], path)
         low, high = self.function.scene.range(path)
         return (max(low, 0.0) if path in positive else low), high
+
+    @staticmethod
+    def _bound(value: object, path: str) -> float:
+        if isinstance(value, bool) or not isinstance(value, Real) or value != value:
+            raise TypeError(f"bounds: {path}: expected (low, high), got {said(value)} in it")
+        return float(value)
 
     def extra_repr(self) -> str:
         """What `print` shows of the layer."""

@@ -524,6 +524,9 @@ Certificate RolloutCertifier::Finish(const Model<double>& model, const RolloutRe
   if (coordinates_) certificate_.coordinates = coordinates_->Message(model);
   if (certificate_.discrete_impact.empty()) certificate_.discrete_impact = made_last_;
   Certificate finished = certificate_;
+  if (report.status != StepStatus::kDone) {
+    finished.discontinuous = "the run fails: " + report.message;
+  }
   SetVerdict(finished);
   return finished;
 }

@@ -79,11 +79,12 @@ double StepTangent::ApplyAndMeasure(const Model<double>& model, Stepper* stepper
   const SolveObserver observer = [&](SolveStage stage, const ContactProblem<double>& problem,
                                      const ContactSystem& system,
                                      const SolveDerivative::Rates& rates) {
-    const int columns = static_cast<int>(rates.cols());
+    // By events one more column is the derivative by the length of a motion.
+    const int all = static_cast<int>(rates.cols());
+    const int columns = std::min(all, static_cast<int>(driven.size()));
     for (int c = 0; c < columns; ++c) {
       if (stage == SolveStage::kAssembled) {
-        driven[c] =
-            driven_.Of(c, problem, rates.data() + c, static_cast<int>(rates.rows()), columns);
+        driven[c] = driven_.Of(c, problem, rates.data() + c, static_cast<int>(rates.rows()), all);
       } else if (driven[c] != 0.0) {
         measure(c, problem, system.contact_block(), rates);
       }

@@ -26,6 +26,8 @@ class EventDerivative {
   /// w_dot: num_variables x columns, of the state before the step on entry, after it on return.
   /// Returns the largest relative residual of the linear solves.
   double Tangent(const Model<double>& model, EventRecord* record, RowMatrixXd* w_dot);
+  /// Has the solves of Tangent's impulses observed, until null is given.
+  void Observe(const SolveObserver* observer) { observer_ = observer; }
   /// w_bar: num_variables x columns, of the state after the step on entry, before it on return.
   void Adjoint(const Model<double>& model, EventRecord* record, RowMatrixXd* w_bar);
 
@@ -80,6 +82,7 @@ class EventDerivative {
   std::vector<JacobianEntry> entries_;
   ImplicitStage implicit_;
   SolveDerivative solve_;
+  const SolveObserver* observer_ = nullptr;
   // For Poisson's law, between an impact's two parts: derivatives of the compression's normal
   // impulses, and of the losses with respect to them; a row for each contact of the compression.
   RowMatrixXd compression_dot_, compression_bar_;

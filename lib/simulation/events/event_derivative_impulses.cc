@@ -13,7 +13,14 @@ double EventDerivative::ImpulsesTangent(const Model<double>& model, Impulses* im
   if (impulses->decompression) {
     AddOffsetsTangent(*impulses);
   }
+  const auto observe = [&](SolveStage stage) {
+    if (observer_ != nullptr) {
+      (*observer_)(stage, impulses->problem, impulses->system, solve_.rates());
+    }
+  };
+  observe(SolveStage::kAssembled);
   const double left = solve_.Solve(*impulses, &impulses->system);
+  observe(SolveStage::kSolved);
   KeepCompression(*impulses);
   solve_.SpreadRates(*model.structure, x);
   return left;

@@ -9,6 +9,7 @@
 // read or change what is solved for: rates().
 
 #include <algorithm>
+#include <functional>
 #include <vector>
 
 #include "tangible/math/scalar.h"
@@ -47,5 +48,13 @@ class SolveDerivative {
   Eigen::Index columns_ = 1;
   LocalJacobianScratch scratch_;
 };
+
+/// Called with the right-hand sides of the tangent of a fixed step, an impact or a projection, and
+/// then with their solution: 3 rows a block of the system, a column for each direction, and by
+/// events one more.
+enum class SolveStage { kAssembled, kSolved };
+using SolveObserver =
+    std::function<void(SolveStage stage, const ContactProblem<double>& problem,
+                       const ContactSystem& system, const SolveDerivative::Rates& rates)>;
 
 }  // namespace tangible

@@ -54,7 +54,8 @@ Input InputOf(const RolloutFunction& f, Eigen::Index column, const VectorX<doubl
               const VectorX<double>& state, const Controls& controls) {
   if (column < f.num_parameters()) {
     const ParameterPath& parameter = f.parameters()[static_cast<size_t>(column)];
-    return {parameter.path, parameters[column], parameter.scale, parameter.kind};
+    const double value = std::isnan(parameters[column]) ? parameter.value : parameters[column];
+    return {parameter.path, value, parameter.scale, parameter.kind};
   }
   column -= f.num_parameters();
   if (column < f.num_states()) {

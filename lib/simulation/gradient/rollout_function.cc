@@ -2,6 +2,7 @@
 #include "tangible/simulation/gradient/rollout_function.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "tangible/dynamics/model/settings.h"
@@ -96,7 +97,37 @@ std::string RolloutFunction::Create(const Scene& scene, const std::vector<std::s
     }
   }
   ReadRecords();
+  ReadOwnValues();
   return "";
+}
+
+void RolloutFunction::ReadOwnValues() {
+  const std::vector<SceneNumber<double>> numbers = EnumerateNumbers(&scene_);
+  const auto values = [&](const std::vector<ParameterPath>& paths) {
+    VectorX<double> own(static_cast<Eigen::Index>(paths.size()));
+    for (size_t k = 0; k < paths.size(); ++k) {
+      const double first = paths[k].value;
+      const bool are_equal = std::all_of(paths[k].numbers.begin(), paths[k].numbers.end(),
+                                         [&](int i) { return *numbers[i].value == first; });
+      own[static_cast<Eigen::Index>(k)] = are_equal ? first : kNaN;
+    }
+    return own;
+  };
+  own_parameters_ = values(parameters_);
+  own_controls_ = values(controls_);
+}
+
+std::string RolloutFunction::SetOn(const VectorX<double>& values, Scene* scene) const {
+  if (own_parameters_.allFinite()) return SetParameters(parameters_, values.data(), scene);
+  std::vector<ParameterPath> set;
+  std::vector<double> to;
+  for (size_t k = 0; k < parameters_.size(); ++k) {
+    const auto i = static_cast<Eigen::Index>(k);
+    if (std::isnan(values[i]) && std::isnan(own_parameters_[i])) continue;
+    set.push_back(parameters_[k]);
+    to.push_back(values[i]);
+  }
+  return SetParameters(set, to.data(), scene);
 }
 
 void RolloutFunction::ReadRecords() {
@@ -124,6 +155,7 @@ RolloutFunction RolloutFunction::OfFinalState(const Scene& scene,
   }
   function.records_ = {function.num_steps()};
   function.ReadRecords();
+  function.ReadOwnValues();
   return function;
 }
 
@@ -143,17 +175,11 @@ void RolloutFunction::SetState(const VectorX<double>& values, State<double>* sta
   for (int i = 0; i < num_states(); ++i) StateNumber(state, outputs_[i]) = values[i];
 }
 
-VectorX<double> RolloutFunction::OwnParameters() const {
-  VectorX<double> values(num_parameters());
-  for (int i = 0; i < num_parameters(); ++i) values[i] = parameters_[i].value;
-  return values;
-}
-
 RolloutInput RolloutFunction::Defaults() const {
   RolloutInput input;
   input.parameters = OwnParameters();
   input.controls.resize(num_controls() == 0 ? 0 : num_steps(), num_controls());
-  for (int i = 0; i < num_controls(); ++i) input.controls.col(i).setConstant(controls_[i].value);
+  for (int i = 0; i < num_controls(); ++i) input.controls.col(i).setConstant(own_controls_[i]);
   Model<double> model;
   State<double> state;
   BuildModelWithStructure(scene_, structure_, &model, &state);

@@ -19,6 +19,7 @@
 // threads; an evaluation has the same bits whatever ran before it, and a batch whatever the number
 // of threads.
 
+#include <cmath>
 #include <functional>
 #include <memory>
 #include <string>
@@ -97,10 +98,18 @@ class RolloutFunction {
   /// The part of a state that belongs to moving bodies, and its inverse.
   VectorX<double> StateOf(const State<double>& state) const;
   void SetState(const VectorX<double>& values, State<double>* state) const;
-  /// The scene's own values of the parameters, each of its first number.
-  VectorX<double> OwnParameters() const;
+  /// The scene's own values of the parameters; NaN where those of a path's numbers differ, which as
+  /// an input leaves them as they are.
+  const VectorX<double>& OwnParameters() const { return own_parameters_; }
+  /// Sets the parameters in a scene that has the function's own numbers where a value leaves them.
+  /// Returns what tangible::SetParameters does.
+  std::string SetOn(const VectorX<double>& values, Scene* scene) const;
+  /// Whether the scene's own values of a control's numbers differ: NaN leaves them as they are.
+  bool LeavesControl(int control) const {
+    return std::isnan(own_controls_[static_cast<Eigen::Index>(control)]);
+  }
   /// The scene's own values: parameters, the initial state, and controls that are the same in all
-  /// steps.
+  /// steps; NaN as in OwnParameters.
   RolloutInput Defaults() const;
   /// Empty, or how an input's sizes are wrong.
   std::string CheckSizes(const RolloutInput& input) const;
@@ -109,6 +118,7 @@ class RolloutFunction {
   friend class RolloutWorker;
   std::string AddControl(const std::string& path);
   void ReadRecords();
+  void ReadOwnValues();
 
   Scene scene_;
   std::shared_ptr<const ModelStructure> structure_;
@@ -116,6 +126,7 @@ class RolloutFunction {
   std::vector<ParameterDirection> directions_;
   std::vector<int> control_numbers_;  ///< of the model: each control's, one after another
   std::vector<int> control_of_number_;
+  VectorX<double> own_parameters_, own_controls_;
   std::vector<long> records_;
   std::vector<int> outputs_;  ///< pose and twist variables
   StateSamples samples_;      ///< a row for each output of each record

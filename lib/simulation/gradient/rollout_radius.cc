@@ -38,7 +38,8 @@ std::vector<ValidityRadius> RolloutWorker::Radii(const RolloutInput& input) {
   std::vector<ValidityRadius> radii;
   for (size_t p = 0; p < f_.parameters_.size(); ++p) {
     const ParameterPath& parameter = f_.parameters_[p];
-    const double value = parameters_[static_cast<Eigen::Index>(p)];
+    const double set = parameters_[static_cast<Eigen::Index>(p)];
+    const double value = std::isnan(set) ? parameter.value : set;
     const auto beside = [&](double shift, ChoiceList* choices) {
       const Beside moved(this, static_cast<Eigen::Index>(p), shift);
       return !moved.is_refused() && RunChoices(choices);

@@ -20,17 +20,20 @@ void RolloutWorker::UseOwnScene() {
 }
 
 bool RolloutWorker::SetParameters(const VectorX<double>& values, RolloutOutput* output) {
-  if (values.size() == parameters_.size() && values == parameters_) {
-    return true;
-  }
+  const auto are_same = [&](const VectorX<double>& other) {
+    return values.size() == other.size() &&
+           (values.array() == other.array() || (values.array().isNaN() && other.array().isNaN()))
+               .all();
+  };
+  if (are_same(parameters_)) return true;
   parameters_.resize(0);
   parameter_jacobian_.reset();
-  if (values == f_.OwnParameters()) {
-    // A path may match numbers that differ.
+  if (are_same(f_.OwnParameters())) {
     UseOwnScene();
     return true;
   }
-  output->message = tangible::SetParameters(f_.parameters_, values.data(), &scene_);
+  if (!f_.OwnParameters().allFinite()) scene_ = f_.scene_;
+  output->message = f_.SetOn(values, &scene_);
   if (!output->message.empty()) {
     UseOwnScene();
     output->status = RolloutStatus::kRefused;
@@ -53,10 +56,14 @@ bool RolloutWorker::Set(const RolloutInput& input, RolloutOutput* output) {
   controls_.values.resize(input.controls.rows(),
                           static_cast<Eigen::Index>(controls_.numbers.size()));
   for (size_t j = 0; j < controls_.numbers.size(); ++j) {
-    controls_.values.col(static_cast<Eigen::Index>(j)) =
-        input.controls.col(f_.control_of_number_[j]);
+    const int control = f_.control_of_number_[j];
+    auto column = controls_.values.col(static_cast<Eigen::Index>(j));
+    column = input.controls.col(control);
+    if (!f_.LeavesControl(control)) continue;
+    const double own = model_.parameters[static_cast<size_t>(controls_.numbers[j])];
+    column = column.array().isNaN().select(own, column);
   }
-  if (!input.state.allFinite() || !input.controls.allFinite()) {
+  if (!input.state.allFinite() || !controls_.values.allFinite()) {
     output->status = RolloutStatus::kRefused;
     output->message = std::string(input.state.allFinite() ? "controls" : "initial_state") +
                       ": expected finite numbers";
@@ -124,7 +131,12 @@ RowMatrixXd RolloutWorker::VariableDirections(const RowMatrixXd& parameters,
 
 Certificate RolloutWorker::Certify(const RolloutInput& input, const std::vector<double>& sizes) {
   RolloutOutput output;
-  if (!Set(input, &output)) return {};
+  if (!Set(input, &output)) {
+    Certificate refused;
+    refused.discontinuous = "there is no run: " + output.message;
+    SetVerdict(refused);
+    return refused;
+  }
   const int states = own_state_ ? f_.num_states() : 0;
   const int columns = f_.num_parameters() + states;
   RowMatrixXd of_parameters = RowMatrixXd::Zero(f_.num_parameters(), columns);

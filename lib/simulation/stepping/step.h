@@ -53,13 +53,6 @@ struct StepTape {
   void DropFactors();
 };
 
-/// Called with the right-hand sides of a fixed step's tangent, and then with their solution: 3 rows
-/// a block of the system, a column for each direction.
-enum class SolveStage { kAssembled, kSolved };
-using SolveObserver =
-    std::function<void(SolveStage stage, const ContactProblem<double>& problem,
-                       const ContactSystem& system, const SolveDerivative::Rates& rates)>;
-
 class Stepper {
  public:
   /// `threads` solve a step's islands; the bits are the same for any number.

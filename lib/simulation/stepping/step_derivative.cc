@@ -22,7 +22,12 @@ void StepTape::DropFactors() {
 
 double Stepper::Tangent(const Model<double>& model, const std::vector<char>& fixed,
                         RowMatrixXd* w_dot, const SolveObserver& observer) {
-  if (events_) return event_derivative_.Tangent(model, &mutable_parts(), w_dot);
+  if (events_) {
+    event_derivative_.of_island().Observe(observer ? &observer : nullptr);
+    const double left = event_derivative_.Tangent(model, &mutable_parts(), w_dot);
+    event_derivative_.of_island().Observe(nullptr);
+    return left;
+  }
   FollowStepTangent(model, record_.time, record_.h, w_dot);
   ChooseImpulses();
   ContactSystem& solved = system();
