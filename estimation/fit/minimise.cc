@@ -35,7 +35,8 @@ constexpr double kMostAtKink = 20;
 constexpr int kMaxAttempts = 3;
 
 // The attempts of an iteration with smaller and smaller regions, where it ends at a level.
-constexpr int kMostLevels = 8;
+constexpr int kMostLevels = 4;
+constexpr char kNoEffectHere[] = "no parameter has an effect on any residual at these values";
 
 // From this number of parameters on sparse factorisations are faster.
 constexpr int kManyParameters = 100;
@@ -248,6 +249,7 @@ class Minimiser : public ceres::IterationCallback {
     }
     ApproachRobustLoss();
     Minimise();
+    TakeLevel();
     minimum_.parameters = ToParameters(entries_, q_);
     minimum_.cost = shared_.target().cost;
     minimum_.gave_up = gave_up_;
@@ -262,6 +264,10 @@ class Minimiser : public ceres::IterationCallback {
     }
     if (accepted && IsLevel()) {
       level_radius_ = summary.trust_region_radius;
+      if (shared_.target().cost < level_cost_) {
+        level_cost_ = shared_.target().cost;
+        level_ = q_;
+      }
       return ceres::SOLVER_ABORT;
     }
     if (accepted) last_good_ = q_;
@@ -327,6 +333,21 @@ class Minimiser : public ceres::IterationCallback {
       if (!(block.jacobian().array() == 0.0).all()) return false;
     }
     return AnyFree(0, layout_.num_parameters());
+  }
+
+  /// Whether the residuals are of the size of sigma: then what no parameter changes may be a
+  /// minimum, as where a bounce that was not observed no longer happens.
+  bool Explains() const {
+    return 2.0 * shared_.target().cost <= kLevelExplains * static_cast<double>(layout_.num_rows());
+  }
+
+  /// Goes back to where no parameter has an effect if nothing was found that costs less.
+  void TakeLevel() {
+    if (level_.size() == 0 || !shared_.ok() || !(level_cost_ <= shared_.target().cost)) return;
+    q_ = level_;
+    shared_.Update();
+    minimum_.status = Explains() ? FitStatus::kConverged : FitStatus::kNotConverged;
+    minimum_.message = kNoEffectHere;
   }
 
   bool PushedOut(size_t k) const {
@@ -713,7 +734,7 @@ class Minimiser : public ceres::IterationCallback {
     if (model.cost <= ExactCost()) {
       return "";
     }
-    if (IsLevel()) return "no parameter has an effect on any residual at these values";
+    if (IsLevel()) return Explains() ? "" : kNoEffectHere;
     const auto kind =
         options_.huber > 0.0 ? FinalSteps::Kind::kNewton : FinalSteps::Kind::kGaussNewton;
     const Eigen::VectorXd lengths = System(FinalSteps::Kind::kGaussNewton).lengths();
@@ -753,7 +774,9 @@ class Minimiser : public ceres::IterationCallback {
   std::vector<int> pushed_;    ///< iterations in a row that the cost falls beyond the bound
   std::vector<double> gains_;  ///< of accepted iterations
   double last_cost_ = kInfinity;
-  int accepted_ = 0;           ///< iterations, with the initial point
+  int accepted_ = 0;       ///< iterations, with the initial point
+  Eigen::VectorXd level_;  ///< q of the least cost at which none had an effect
+  double level_cost_ = kInfinity;
   Eigen::VectorXd last_good_;  ///< q of the last one where some parameter had an effect
   double level_radius_ = 0.0;  ///< of the region whose step has led to where none has; 0: none
   bool gave_up_ = false;

@@ -24,7 +24,10 @@ inline constexpr double kChangesAsRounding = 1e-3;
 inline constexpr double kStepOfLogarithm = 3.5;
 /// Of the radius of the trust region: where an iteration has ended at values at which no parameter
 /// has an effect, it is repeated with a region so much smaller.
-inline constexpr double kSmallerRegion = 1e-2;
+inline constexpr double kSmallerRegion = 1e-3;
+/// Of sigma², the mean square of residuals: with more, values at which no parameter has an effect
+/// are no minimum.
+inline constexpr double kLevelExplains = 10.0;
 /// Of the cost: minima of two starts whose costs differ by less are the same.
 inline constexpr double kSameCost = 1e-6;
 /// Of the lower cost, beyond 1 σ²: a minimum that costs more is not the global one.

@@ -183,3 +183,10 @@ def test_examples_travel_with_the_wheel() -> None:
     present = {path.name for path in (PACKAGE / "tangible").iterdir() if path.name != "__pycache__"}
     assert set(linked) == present
     assert {path.suffix for path in (PACKAGE / "tangible" / "scenes").iterdir()} == {".json"}
+
+
+def test_the_version_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["--version"])
+    assert ended.value.code == 0
+    assert capsys.readouterr().out == f"tangible {tangible.__version__}\n"

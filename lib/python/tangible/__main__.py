@@ -10,7 +10,7 @@ import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
-from . import TangibleError, fit, plan, simulate
+from . import TangibleError, __version__, fit, plan, simulate
 from ._plain import write_whole
 from ._problem import object_of, text_of
 from ._trajectory import COMPONENTS, UNITS
@@ -114,6 +114,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("file", metavar="FILE", help="a scene, a fit or a problem of control, as JSON")
     parser.add_argument("--out", metavar="FILE", help="what is found, by the end of the name")
     parser.add_argument("--report", metavar="FILE.html", help="the report of a fit")
+    parser.add_argument("--version", action="version", version=f"tangible {__version__}")
     given = parser.parse_args(arguments)
     try:
         kind = _kind(given.file)

@@ -230,6 +230,13 @@ class Scene:
         """The value of a parameter; of several that match, of the first."""
         return self.core.value(text(path, "path", "the path of a parameter"))
 
+    def __contains__(self, path: object) -> bool:
+        """Whether the path is that of a parameter."""
+        try:
+            return isinstance(path, str) and self.core.value(path) is not None
+        except _core.TangibleError:
+            return False
+
     def __repr__(self) -> str:
         if not self._data:
             return f"Scene({self.name!r}, bodies={self.core.body_names})"

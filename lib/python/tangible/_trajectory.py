@@ -202,9 +202,9 @@ class Trajectory:
     def unit(self, name: str) -> str:
         """The unit of a coordinate: "m", "rad", "m/s", "rad/s"."""
         owner, _, component = text(name, "name", "the name of a coordinate").rpartition("/")
+        self[name]  # raises where there is none
         if component in UNITS:
             return UNITS[component]
-        self[name]  # raises where there is none
         unit = self.joints.units[self.joints.names.index(owner)]
         return unit if component == "coordinate" else f"{unit}/s"
 

@@ -113,6 +113,10 @@ class SceneEnv(gymnasium.Env):  # type: ignore[misc]
         """(observation, reward, terminated, truncated, info with the `state`)."""
         clipped = np.clip(np.asarray(action, dtype=np.float64), self._low, self._high)
         before = self.simulation.state
+        if np.isnan(before).any():
+            raise ValueError("step: expected a reset before it")
+        if np.isnan(clipped).any():
+            raise ValueError("action: expected numbers, got NaN")
         info: dict[str, Any] = {}
         try:
             state = self._advance(clipped)
