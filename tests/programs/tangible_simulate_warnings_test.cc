@@ -219,5 +219,29 @@ TEST_F(WarningsTest, AStartBeyondALimitIsNamed) {
   EXPECT_EQ(Simulate(scene("0"), "--out=/dev/null").error.find("limit"), std::string::npos);
 }
 
+// A disc that falls beside a half-pipe is behind its upright wall, and is pushed in through it.
+TEST_F(WarningsTest, WhatComesBehindALinePastItsEndIsNamed) {
+  const auto at = [](const char* x) {
+    return std::string(R"({"bodies": [{"name": "b", "shape": {"circle": {"radius": 0.1}}, "mass": 1,
+        "position": [)") +
+           x + R"(, 0.5]}, {"name": "pipe", "static": true, "shape": {"polyline": {"points":
+        [[-1, 0], [-0.7, -0.7], [0, -1], [0.7, -0.7], [1, 0]], "solid": "right"}}}],
+        "simulation": {"dt": 0.01, "duration": 0.6, "stepping": "event"}})";
+  };
+  ExpectOneLine(Simulate(at("1.2")), 0, "body b is behind the line of body pipe from t = 0.4");
+  EXPECT_EQ(Simulate(at("0.2")).error, "");
+}
+
+// A bob that its string has let go is where it flies.
+TEST_F(WarningsTest, AJointThatHasEndedHasNoDrift) {
+  const ProgramRun run = Simulate(R"({"bodies": [
+      {"name": "b", "mass": 1, "inertia": 0.01, "position": [1, 0], "velocity": [0, 2]}],
+      "joints": [{"name": "s", "type": "distance", "bodies": ["b", "world"],
+                  "anchors": [[1, 0], [0, 0]], "until": 0.3}],
+      "simulation": {"dt": 0.01, "duration": 1, "stepping": "event"}})");
+  EXPECT_EQ(run.exit_status, 0) << run.error;
+  EXPECT_LE(summary_["joint_drift_max"].get<double>(), 1e-10);
+}
+
 }  // namespace
 }  // namespace tangible

@@ -432,5 +432,27 @@ TEST(DrivenBodiesTest, WhatHangsOnAPathThatStopsComesToRest) {
   }
 }
 
+// A pusher stops as a ball comes to it: met a little earlier the ball is struck by what still
+// moves. Where the pusher becomes faster instead, an inelastic ball leaves with the later speed
+// whichever comes first.
+TEST(DrivenBodiesTest, WhatAPathThatJumpsMeetsIsDiscontinuous) {
+  for (const double later : {0.0, 3.0}) {
+    const Scene scene = SceneOf(
+        R"({"gravity": [0, 0], "bodies": [
+        {"name": "b", "mass": 1, "shape": {"circle": {"radius": 0.5}}, "position": [2, 0],
+         "velocity": [-1, 0]},
+        {"name": "k", "kinematic": true, "shape": {"circle": {"radius": 0.5}}, "position": [0, 0],
+         "motion": {)" +
+        Series({0.0, 0.5, 1.0},
+               {{"x", [&](double t) { return t < 0.6 ? t : 0.5 + later * 0.5; }}}) +
+        R"(, "interpolation": "linear"}}])" + DrivenFor("event", 0.01, 0.8));
+    const std::string verdict =
+        JacobianOf(scene, {"bodies/b/position/x"}, GradientMethod::kAuto).certificate.verdict;
+    EXPECT_EQ(verdict.find("discontinuous: ") == 0, later == 0.0) << verdict;
+    const bool names = verdict.find("as the speed of body k jumps") != std::string::npos;
+    EXPECT_TRUE(names || later > 0.0) << verdict;
+  }
+}
+
 }  // namespace
 }  // namespace tangible
