@@ -71,18 +71,10 @@ class SharedLinearisation : public ceres::EvaluationCallback {
       return;
     }
     at_ = *q_;
-    if (!evaluate_jacobians && IsFarOff()) {
-      ok_ = has_model_ = false;
-      return;
-    }
-    if (evaluate_jacobians) centre_ = at_;
     ok_ = evaluate_jacobians ? linearizer_->Linearise(*q_, huber_, &model_, &target_)
                              : linearizer_->Cost(*q_, huber_, &block_costs_, &target_.cost);
     has_model_ = ok_ && evaluate_jacobians;
   }
-
-  /// `entries`: of q.
-  void LimitSteps(const std::vector<ParameterEntry>* entries) { entries_ = entries; }
 
   void SetHuber(double current) {
     huber_.current = current;
@@ -107,23 +99,9 @@ class SharedLinearisation : public ceres::EvaluationCallback {
   }
 
  private:
-  // Whether a step from the last linear model changes a logarithm by too much.
-  bool IsFarOff() const {
-    if (entries_ == nullptr || centre_.size() != at_.size()) return false;
-    for (Eigen::Index k = 0; k < at_.size(); ++k) {
-      if ((*entries_)[static_cast<size_t>(k)].logarithmic &&
-          std::abs(at_[k] - centre_[k]) > kStepOfLogarithm) {
-        return true;
-      }
-    }
-    return false;
-  }
-
   Linearizer* linearizer_;
   HuberBounds huber_;
   const Eigen::VectorXd* q_;
-  const std::vector<ParameterEntry>* entries_ = nullptr;
-  Eigen::VectorXd centre_;  ///< of the last linear model
   Eigen::VectorXd at_;
   Linearisation model_, target_;
   Eigen::VectorXd block_costs_;
@@ -236,9 +214,7 @@ class Minimiser : public ceres::IterationCallback {
         q_(ToInternal(entries_, start)),
         shared_(&linearizer_, {options.huber, options.huber}, &q_),
         held_(entries_.size(), false),
-        pushed_(entries_.size(), 0) {
-    shared_.LimitSteps(&entries_);
-  }
+        pushed_(entries_.size(), 0) {}
 
   Minimum Run() {
     shared_.Update();

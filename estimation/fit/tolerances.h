@@ -19,9 +19,6 @@ inline constexpr double kBesideStep = 1e-6;
 inline constexpr double kRoundingBeside = 1e-10;
 inline constexpr double kNotSeen = 1e-3;
 inline constexpr double kChangesAsRounding = 1e-3;
-/// Of 1: the most by which a step may change the logarithm of a parameter, a factor of 33: beyond,
-/// a model may take minutes for a run that says nothing.
-inline constexpr double kStepOfLogarithm = 3.5;
 /// Of the radius of the trust region: where an iteration has ended at values at which no parameter
 /// has an effect, it is repeated with a region so much smaller.
 inline constexpr double kSmallerRegion = 1e-3;

@@ -46,6 +46,7 @@ double StepTangent::ApplyAndMeasure(const Model<double>& model, Stepper* stepper
                                     RowMatrixXd* w_dot) {
   std::vector<double> driven(static_cast<size_t>(w_dot->cols()), 0.0);
   double worst = 0.0;
+  const size_t num_joints = model.structure->joints.size();
   const auto measure = [&](int c, const ContactProblem<double>& problem,
                            const std::vector<int>& block_of, const SolveDerivative::Rates& rates) {
     double impulse = 0.0;
@@ -64,7 +65,9 @@ double StepTangent::ApplyAndMeasure(const Model<double>& model, Stepper* stepper
       // Friction in a joint, and a motor, have no normal row.
       add(row + 1, normal > 0.0 ? normal : tangent);
     }
-    for (size_t j = 0; j < problem.joints.size(); ++j) {
+    // Of supports, which stand behind the joints of a whole model.
+    const size_t first = stepper->by_events() ? problem.joints.size() : num_joints;
+    for (size_t j = first; j < problem.joints.size(); ++j) {
       const JointBlock<double>& joint = problem.joints[j];
       for (int k = 0; k < joint.rows; ++k) {
         add(3 * (problem.num_bodies + static_cast<Eigen::Index>(j)) + k,

@@ -40,12 +40,11 @@ bool RolloutWorker::BothSidesAgree(const RolloutInput& input) {
     const double rounding = kValueRounding * kSideWay * largest / way;
     const double size =
         std::max(here.cwiseAbs().maxCoeff(), kNoDerivative * kSideWay * largest / way);
-    int sides = 0;
     for (const double shift : {way, -way}) {
       VectorX<double> beside, nearer;
       const RolloutOutput far = TangentBeside(input, k, shift, &beside);
-      if (far.status == RolloutStatus::kRefused) continue;  // the range ends
       const RolloutOutput near = TangentBeside(input, k, 0.5 * shift, &nearer);
+      // Also where the parameter's range ends, beside which nothing is known.
       if (far.status != RolloutStatus::kDone || near.status != RolloutStatus::kDone) return false;
       const double apart = (2.0 * nearer - beside - here).cwiseAbs().maxCoeff();
       // Simpson's rule: the values do not jump either.
@@ -56,9 +55,7 @@ bool RolloutWorker::BothSidesAgree(const RolloutInput& input) {
           !(missed <= kContinuous * way * size + kValueRounding * largest)) {
         return false;
       }
-      ++sides;
     }
-    if (sides == 0) return false;
   }
   return true;
 }

@@ -128,18 +128,6 @@ TEST(MinimiseTest, WhereNothingHasAnEffectIsNoMinimum) {
       << minimum.message;
 }
 
-// A model may take minutes for values that are wrong by orders of magnitude.
-TEST(MinimiseTest, ALogarithmChangesByAFactorOf33AtMost) {
-  OneResidual problem(1.0, true, [](double x) { return std::pair(std::log(x) - 12.0, 1.0 / x); });
-  const Minimum minimum = Minimise(
-      {}, Eigen::VectorXd::Constant(1, 1.0), [] { return 0.0; }, {}, &problem);
-  EXPECT_EQ(minimum.status, FitStatus::kConverged) << minimum.message;
-  EXPECT_NEAR(std::log(minimum.parameters[0]), 12.0, 1e-9);
-  for (size_t i = 1; i < problem.seen.size(); ++i) {
-    EXPECT_LT(problem.seen[i], 34.0 * problem.seen[i - 1]);
-  }
-}
-
 /// r = (x, −1 + 0.45 x²) / σ, whose minimum is far from zero: near x = 0 a Gauss-Newton step goes a
 /// tenth of the way to it.
 class FarFromZero : public LeastSquaresProblem {

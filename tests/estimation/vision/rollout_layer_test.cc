@@ -58,7 +58,11 @@ at::Tensor TensorOf(const double* values, std::vector<int64_t> shape) {
 RolloutTensors Inputs(const RolloutLayer& layer, int64_t rows) {
   torch::manual_seed(3);
   const RolloutFunction& f = layer.function();
-  const RolloutInput own = f.Defaults();
+  RolloutInput own = f.Defaults();
+  // The scene's own are not numbers where those of a path differ.
+  for (int k = 0; k < f.num_parameters(); ++k) {
+    own.parameters[k] = f.parameters()[static_cast<size_t>(k)].value;
+  }
   const at::Tensor p = TensorOf(own.parameters.data(), {f.num_parameters()});
   const at::Tensor x = TensorOf(own.state.data(), {f.num_states()});
   const at::Tensor u = TensorOf(own.controls.data(), {f.num_steps(), f.num_controls()});

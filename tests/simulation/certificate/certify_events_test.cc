@@ -325,7 +325,7 @@ TEST(CertifyEventsTest, AnImpactAsAMotorReachesItsSpeedIsAKink) {
     return std::string(R"("gravity": [0, 0], "bodies": [{"name": "b", "mass": 1, "inertia": 0.01,
         "position": [0, 0]}], "joints": [{"name": "j", "type": "prismatic",
         "bodies": ["b", "world"], "anchor": [0, 0], "axis": [1, 0], "limits": [-1, )") +
-           limit + R"(], "restitution": 1, "motor": {"speed": 1, "limit": 40}}])";
+           limit + R"(], "limit_restitution": 1, "motor": {"speed": 1, "limit": 40}}])";
   };
   EXPECT_NE(CertificateFor(slider("0.0125"), {"joints/j/motor/speed"})
                 .verdict.find("an impact as a contact stops sliding"),

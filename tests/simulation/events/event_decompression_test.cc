@@ -300,7 +300,8 @@ TEST(EventDecompressionTest, FrictionAtItsLimitInDecompressionIsAKink) {
     const std::string was = Number(0.5) + "}";
     text.replace(text.find("\"friction\": " + was), 12 + was.size(),
                  "\"friction\": " + std::string(digits) + "}");
-    return Jacobian(SceneOf(text), {"bodies/rod/velocity/x"}, GradientMethod::kTangent).certificate;
+    return Jacobian(SceneOf(text), {"pairs/rod:floor/friction"}, GradientMethod::kTangent)
+        .certificate;
   };
   const Certificate at_limit = certificate(limit);
   EXPECT_EQ(at_limit.verdict.substr(0, 11), "near a kink") << at_limit.verdict;

@@ -41,7 +41,11 @@ RolloutInput InputOf(const RolloutFunction& function, unsigned seed) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> unit(-1.0, 1.0);
   RolloutInput input = function.Defaults();
-  for (double& x : input.parameters) x *= 1.0 + 0.02 * unit(random);
+  for (int k = 0; k < function.num_parameters(); ++k) {
+    // The scene's own are not numbers where those of a path differ.
+    input.parameters[k] = function.parameters()[static_cast<size_t>(k)].value;
+    input.parameters[k] *= 1.0 + 0.02 * unit(random);
+  }
   for (double& x : input.state) x += 0.002 * unit(random);
   // The pendulum stays on its joint: of its state only the disc's is another one.
   input.state.tail(6) = function.Defaults().state.tail(6);
