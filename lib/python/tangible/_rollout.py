@@ -253,9 +253,9 @@ class Rollout:
 
     @property
     def default_parameters(self) -> Floats:
-        """The scene's own values, shape (P,); NaN where the numbers of a path differ, which as an
-        argument leaves them as they are."""
-        return np.array(self._defaults[0][0])
+        """The scene's own values, shape (P,); of a path whose numbers differ the first one's. Given
+        as an argument, a value sets all of them."""
+        return self._first(self._defaults[0][0], self.parameters)
 
     @property
     def default_initial_state(self) -> Floats:
@@ -264,8 +264,16 @@ class Rollout:
 
     @property
     def default_controls(self) -> Floats:
-        """The scene's own values in each step, shape (steps, C)."""
-        return np.array(self._defaults[2][0])
+        """The scene's own values in each step, shape (steps, C); of a path as `default_parameters`."""
+        return self._first(self._defaults[2][0], self.controls)
+
+    def _first(self, own: Floats, names: Sequence[str]) -> Floats:
+        """Where `own` is NaN, as the numbers of a path differ, the first of them."""
+        values = np.array(own)
+        for k, name in enumerate(names):
+            if np.isnan(values[..., k]).any():
+                values[..., k] = self.scene[name]
+        return values
 
     def _inputs(
         self,

@@ -80,8 +80,8 @@ class Simulation:
         self._rows = 1 if batch is None else batch
         self._threads = whole(threads, "threads", 0, MOST_THREADS)
         self._core = self._make()
-        self._set = np.tile(self._rollout.default_parameters, (self._rows, 1))  # parameters of each row
-        own = self._rollout.default_controls
+        self._set = np.tile(self._rollout._defaults[0][0], (self._rows, 1))  # parameters of each row
+        own = self._rollout._defaults[2][0]
         self._own = own[0] if len(own) else np.array([read[path] for path in self.controls])
         self._noise = np.zeros(len(outputs))
         self._spread_of_parameters = np.zeros(len(names))
@@ -128,7 +128,7 @@ class Simulation:
         for path, column in columns.items():
             if not (len(column) and np.isfinite(column).all()):
                 raise ValueError(f"domains {path}: expected finite numbers, got {column}")
-        table = np.tile(self._rollout.default_parameters, (*sizes.pop(), 1))
+        table = np.tile(self._rollout._defaults[0][0], (*sizes.pop(), 1))
         for path, column in columns.items():
             table[:, self.parameters.index(path)] = column
         return table
@@ -235,7 +235,7 @@ class Simulation:
         if any(not 0 <= row < self._rows for row in chosen):
             raise ValueError(f"rows: expected numbers from 0 to {self._rows - 1}, got {chosen}")
         count = len(chosen)
-        own = self._rollout.default_parameters
+        own = self._rollout._defaults[0][0]
         if parameters is not None:
             p = self._spread(parameters, "parameters", self.parameters, own, count)
         elif self._domains is not None:

@@ -127,7 +127,7 @@ def rollout(
             if value.ndim not in (len(size), len(size) + 1) or value.shape[value.ndim - len(size) :] != size:
                 raise ValueError(f"{name}: expected shape {size}, or one more axis, got {value.shape}")
         if all(value is None for value in given):
-            given = (jnp.asarray(function.default_parameters), None, None)
+            given = (jnp.asarray(function._defaults[0][0]), None, None)
         rows = is_batched(given)
         return evaluate(*(spread(given, rows) if rows else given))
 

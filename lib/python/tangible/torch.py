@@ -184,9 +184,6 @@ class RolloutLayer(torch.nn.Module):
         choice(on_failure, "on_failure", "raise", "nan")
         check_kinks(kinks, smoothing)
         start = torch.as_tensor(self.function.default_parameters)
-        for path, value in zip(self.function.parameters, start.tolist()):
-            if value != value:
-                raise ValueError(f"{path}: expected numbers of one value to start from, got some that differ")
         limits = dict(bounds or {})
         for name in [*(positive or []), *limits]:
             if name not in parameters:
