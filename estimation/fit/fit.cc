@@ -104,6 +104,11 @@ void LeaveOutRounding(const Eigen::VectorXd& p, const std::vector<ParameterEntry
                       Linearizer* linearizer, Eigen::VectorXd* effect) {
   const HuberBounds plain{0.0, 0.0};
   const Eigen::VectorXd all = *effect;
+  // Beside random forces that explain nearly all, other effects are small and real.
+  const LeastSquaresProblem& problem = *linearizer->problem();
+  for (int block = 0; block < problem.num_blocks(); ++block) {
+    if (problem.num_noise_rows(block) > 0) return;
+  }
   const auto effect_of = [&](Eigen::Index k) {
     const ParameterEntry& entry = entries[static_cast<size_t>(k)];
     return all[k] * (entry.logarithmic ? 1.0 : std::max(std::abs(p[k]), entry.scale));

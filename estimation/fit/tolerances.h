@@ -17,7 +17,7 @@ inline constexpr double kBesideStep = 1e-6;
 /// Of the largest effect of a parameter, as long as it is below kNotSeen of sigma too: smaller ones
 /// are rounding.
 inline constexpr double kRoundingBeside = 1e-10;
-inline constexpr double kNotSeen = 1e-3;
+inline constexpr double kNotSeen = 1e-6;
 inline constexpr double kChangesAsRounding = 1e-3;
 /// Of the radius of the trust region: where an iteration has ended at values at which no parameter
 /// has an effect, it is repeated with a region so much smaller.
