@@ -8,12 +8,12 @@
 #include <random>
 #include <utility>
 
-#include "tangible/estimation/fit/block_system.h"
 #include "tangible/estimation/fit/fit_checkpoint.h"
 #include "tangible/estimation/fit/fit_parts.h"
 #include "tangible/estimation/fit/held_refit.h"
 #include "tangible/estimation/fit/linearisation.h"
 #include "tangible/estimation/fit/minimise.h"
+#include "tangible/estimation/fit/parameter_effects.h"
 #include "tangible/estimation/fit/profile.h"
 #include "tangible/estimation/fit/shooting.h"
 #include "tangible/estimation/fit/starts.h"
@@ -36,27 +36,6 @@ constexpr int kMostBetter = 3;
 
 // Far from the minimum the first iterations of a fit that gets there gain the most.
 constexpr int kTrialIterations = 5;
-
-/// ‖∂r/∂q‖ of each parameter.
-Eigen::VectorXd EffectOf(const BlockLayout& layout, const Linearisation& model) {
-  std::vector<RowMatrixXd> blocks;
-  for (const BlockFactor& block : model.blocks) {
-    blocks.emplace_back(block.jacobian());
-  }
-  return BlockSystem(layout, blocks,
-                     std::vector<bool>(static_cast<size_t>(layout.num_parameters()), false))
-      .lengths();
-}
-
-/// The first parameter that changes no residual; −1 if every parameter changes one.
-int FindNoEffect(const Eigen::VectorXd& effect) {
-  for (Eigen::Index k = 0; k < effect.size(); ++k) {
-    if (!(effect[k] > kNoEffect)) {
-      return static_cast<int>(k);
-    }
-  }
-  return -1;
-}
 
 FitStart Describe(const Eigen::VectorXd& initial, const Minimum& minimum) {
   FitStart start;
@@ -97,41 +76,6 @@ struct FirstPoint {
   long rollouts = 0;           ///< of fits without a parameter
 };
 
-/// Sets to 0 the effects that are rounding: those so small that the parameter cannot be told from
-/// the observations, which are of the size of rounding beside those of others, or change where the
-/// parameter is moved by a little.
-void LeaveOutRounding(const Eigen::VectorXd& p, const std::vector<ParameterEntry>& entries,
-                      Linearizer* linearizer, Eigen::VectorXd* effect) {
-  const HuberBounds plain{0.0, 0.0};
-  const Eigen::VectorXd all = *effect;
-  // Beside random forces that explain nearly all, other effects are small and real.
-  const LeastSquaresProblem& problem = *linearizer->problem();
-  for (int block = 0; block < problem.num_blocks(); ++block) {
-    if (problem.num_noise_rows(block) > 0) return;
-  }
-  const auto effect_of = [&](Eigen::Index k) {
-    const ParameterEntry& entry = entries[static_cast<size_t>(k)];
-    return all[k] * (entry.logarithmic ? 1.0 : std::max(std::abs(p[k]), entry.scale));
-  };
-  double largest = 0.0;
-  for (Eigen::Index k = 0; k < all.size(); ++k) largest = std::max(largest, effect_of(k));
-  for (Eigen::Index k = 0; k < all.size(); ++k) {
-    bool is_rounding = effect_of(k) < std::min(kRoundingBeside * largest, kNotSeen);
-    if (!is_rounding && effect_of(k) < kMayBeRounding) {
-      const ParameterEntry& entry = entries[static_cast<size_t>(k)];
-      const double step = kBesideStep * std::max(std::abs(p[k]), entry.scale);
-      Eigen::VectorXd beside = p;
-      beside[k] += p[k] + step < entry.upper ? step : -step;
-      Linearisation model;
-      Linearisation target;
-      is_rounding =
-          linearizer->Linearise(ToInternal(entries, beside), plain, &model, &target) &&
-          std::abs(EffectOf(linearizer->layout(), model)[k] - all[k]) > kChangesAsRounding * all[k];
-    }
-    if (is_rounding) (*effect)[k] = 0.0;
-  }
-}
-
 /// Where the others are once they have followed the observations without a parameter that has no
 /// effect where it is, such as the friction of what is not pushed far enough to slide: it may have
 /// one there. Empty where the fit without it fails.
@@ -163,7 +107,7 @@ bool FindStart(const FitOptions& options, LeastSquaresProblem* problem, Lineariz
   result->initial_cost = target.cost;
   first->gradient_norm = target.gradient.norm();
   const auto effect_at = [&](const Eigen::VectorXd& at) {
-    Eigen::VectorXd effect = EffectOf(linearizer->layout(), model);
+    Eigen::VectorXd effect = EffectsOf(linearizer->layout(), model);
     LeaveOutRounding(at, entries, linearizer, &effect);
     return effect;
   };

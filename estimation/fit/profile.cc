@@ -382,7 +382,7 @@ std::vector<std::pair<int, std::string>> NeedProfiles(const FitOptions& options,
     if (IsAtBound(entry, result.estimate[k])) {
       proposed.emplace_back(k, "at a bound");
     } else if (!trusting) {
-      // What is not determined has no profile, unless it alone is not: then it may be from one side.
+      // What is not determined has no profile, unless it alone is not: then it may have one side.
       if (num_undetermined == 1) proposed.emplace_back(k, "no effect at the estimate");
     } else if (kink) {
       proposed.emplace_back(k, "the certificate names a kink");

@@ -166,9 +166,11 @@ def _array(
     values: Numbers, name: str, names: Sequence[str], base: Floats
 ) -> Floats:
     """An array of the shape of `base`, or with one more, leading axis."""
-    by_name = values if isinstance(values, Mapping) else named(values)
-    if by_name is not None:
-        return _by_name(by_name, name, names, base)
+    if isinstance(values, Mapping):
+        return _by_name(values, name, names, base)
+    columns = named(values)
+    if columns is not None:
+        return _by_name(columns, name, names, base)
     array = floats(values, name)
     if array.ndim not in (base.ndim, base.ndim + 1):
         raise ValueError(

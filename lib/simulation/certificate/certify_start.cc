@@ -247,9 +247,9 @@ void RolloutCertifier::AddSupportsAtStart(const Model<double>& model, const Segm
   }
 }
 
-// A disc that starts exactly at the end of a face, or just beside it: on one side it leaves the face
-// later, or not at all. While it moves along, a direction that changes its speed alone does not
-// change where it is.
+// A disc that starts exactly at the end of a face, or just beside it: on one side it leaves the
+// face later, or not at all. While it moves along, a direction that changes its speed alone does
+// not change where it is.
 void RolloutCertifier::AddHandOversAtStart(const Model<double>& model, const State<double>& start,
                                            const std::vector<const ActiveContact*>& touching) {
   const ModelStructure& s = *model.structure;

@@ -22,8 +22,8 @@ template <typename T>
 class ModeElimination {
  public:
   /// Solves the problem with the given modes of its contacts, for bodies, normal impulses, and the
-  /// tangential impulses of contacts that stick. `signs`: σ of the others in λt = −σ μ λn. Cost: the
-  /// cube of the number of rows.
+  /// tangential impulses of contacts that stick. `signs`: σ of the others in λt = −σ μ λn. Cost:
+  /// the cube of the number of rows.
   static void Solve(const ContactProblem<T>& p, const std::vector<ContactMode>& modes,
                     const std::vector<double>& signs, ContactSolution<T>* out) {
     int size = 3 * p.num_bodies;
