@@ -225,7 +225,7 @@ class RolloutWorker {
   template <int N>
   bool JetPass(JetRoute route, Eigen::Index first, RowMatrixXd* jacobian, RolloutOutput* output);
   void JacobianByDifferences(double step, RowMatrixXd* jacobian, RolloutOutput* output);
-  /// Whether the derivatives of all outputs by each parameter are those beside it, from both sides.
+  /// Whether the derivatives of all outputs by each parameter are those beside it on both sides.
   /// False where that is not looked at: beside an initial state or controls, or for many parameters.
   bool BothSidesAgree(const RolloutInput& input);
   /// The certificate without kinks that do not matter (rollout_kinks.cc).

@@ -213,8 +213,8 @@ TEST(PolylineTest, DerivativesOfAllMethodsAgree) {
   }
 }
 
-// A box slides into a slope of 45 degrees, which catches its corner: the corner stays where floor and
-// slope meet, and the box turns about it with what is left of its angular momentum.
+// A box slides into a slope of 45 degrees, which catches its corner: the corner stays where floor
+// and slope meet, and the box turns about it with what is left of its angular momentum.
 TEST(PolylineTest, ACornerThatIsCaughtInAValleyIsAPivot) {
   const char ground[] = R"("polyline": {"points": [[-2, 0], [0, 0], [1, 1]], "solid": "right"})";
   const Scene scene =
