@@ -226,7 +226,7 @@ class RolloutWorker {
   bool JetPass(JetRoute route, Eigen::Index first, RowMatrixXd* jacobian, RolloutOutput* output);
   void JacobianByDifferences(double step, RowMatrixXd* jacobian, RolloutOutput* output);
   /// Whether the derivatives of all outputs by each parameter are those beside it on both sides.
-  /// False where that is not looked at: beside an initial state or controls, or for many parameters.
+  /// False where that is not looked at: beside an initial state or controls, for many parameters.
   bool BothSidesAgree(const RolloutInput& input);
   /// The certificate without kinks that do not matter (rollout_kinks.cc).
   Certificate WithoutIdleKinks(const RolloutInput& input, Certificate certificate);
