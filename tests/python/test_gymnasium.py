@@ -161,7 +161,7 @@ def test_breakout_keeps_what_was_drawn_and_counts_every_touch(adapter: Any) -> N
         for _ in range(150 // steps):
             reward += env.step([0.0])[1]
             if env.simulation.parameters:
-                assert env.simulation.set_parameters[0].tolist() == [5.0]
+                assert env.simulation.row_parameters[0].tolist() == [5.0]
         assert env.simulation.parameters == [mass]
         hits[steps] = reward
     assert hits[1] == hits[5] > 0

@@ -149,7 +149,7 @@ class Simulation:
         return self._rollout.parameters
 
     @property
-    def set_parameters(self) -> Floats:
+    def row_parameters(self) -> Floats:
         """The parameters of the last reset of each row, shape (N, P); NaN: the scene's own, where
         those of a path differ."""
         return self._set.copy()

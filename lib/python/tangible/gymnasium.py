@@ -243,7 +243,7 @@ class _Breakout(SceneEnv):
         # What was drawn for the episode stays.
         values = {
             path: value
-            for path, value in zip(self.simulation.parameters, self.simulation.set_parameters[0])
+            for path, value in zip(self.simulation.parameters, self.simulation.row_parameters[0])
             if not hit & set(path.replace(":", "/").split("/"))
         }
         self.simulation = Simulation(data, self.simulation.controls, parameters=list(values))
