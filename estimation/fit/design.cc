@@ -411,7 +411,7 @@ std::string CheckCandidate(const FitInput& input, const DesignCandidate& candida
     const SetBy by = FindSet(run, resolved.numbers);
     if (by.parameter < 0) continue;
     const FitParameter& parameter = run.parameters[static_cast<size_t>(by.parameter)];
-    if (!IsOfInitialState(parameter)) {
+    if (!IsOfInitialState(run.scene, parameter)) {
       return path + ": expected a number that is not to be found, got that of parameter " +
              parameter.name;
     }
@@ -438,7 +438,8 @@ bool StaysOverTakes(const FitInput& input, const RecordingsProblem& problem, int
   if (problem.RecordingOf(parameter) >= 0) return false;
   const auto index = static_cast<size_t>(problem.IndexInRecording(parameter));
   if (input.scopes[index].kind == ParameterScope::Kind::kVaries) return true;
-  return !IsOfInitialState(input.recordings.front().problem.parameters[index]);
+  const FitProblem& run = input.recordings.front().problem;
+  return !IsOfInitialState(run.scene, run.parameters[index]);
 }
 
 std::string MakeDesign(const FitInput& input, const DesignRequest& request,

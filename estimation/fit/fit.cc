@@ -29,7 +29,7 @@ namespace {
 
 // Further starts are made by default of fits with at most so many recordings.
 constexpr int kMostBlocksOfStarts = 30;
-// Profiles that nobody asked for take as many runs as the fit, or this many of each recording.
+// Profiles that nobody asked for take as many runs as the fit, or each this many of each recording.
 constexpr long kLeastProfileRuns = 200;
 // Profiles may find a better minimum, from which everything is judged anew, so many times.
 constexpr int kMostBetter = 3;
@@ -112,6 +112,8 @@ bool FindStart(const FitOptions& options, LeastSquaresProblem* problem, Lineariz
     return effect;
   };
   Eigen::VectorXd effect = effect_at(p);
+  double cost = target.cost;
+  bool jumps = false;  // the cost changes with the parameter although its derivative is 0
   for (size_t round = 0; round <= entries.size(); ++round) {
     const int parameter = FindNoEffect(effect);
     if (parameter < 0) {
@@ -124,9 +126,12 @@ bool FindStart(const FitOptions& options, LeastSquaresProblem* problem, Lineariz
       if (linearizer->Linearise(ToInternal(entries, nudged), huber, &model, &target)) {
         effect = effect_at(nudged);
         found = effect[parameter] > kNoEffect;
+        jumps = jumps || (!found && std::abs(target.cost - cost) > kJumpsBy * (1.0 + cost));
       }
       if (found) {
         p = nudged;
+        cost = target.cost;
+        jumps = false;
       }
     }
     if (!found && round < entries.size()) {
@@ -136,7 +141,11 @@ bool FindStart(const FitOptions& options, LeastSquaresProblem* problem, Lineariz
               linearizer->Linearise(ToInternal(entries, moved), huber, &model, &target);
       if (found) effect = effect_at(moved);
       found = found && effect[parameter] > kNoEffect;
-      if (found) p = moved;
+      if (found) {
+        p = moved;
+        cost = target.cost;
+        jumps = false;
+      }
     }
     if (!found) {
       result->parameter = parameter;
@@ -144,9 +153,15 @@ bool FindStart(const FitOptions& options, LeastSquaresProblem* problem, Lineariz
     }
   }
   result->status = FitStatus::kNoEffect;
+  const std::string name = "parameter \"" + entries[result->parameter].name + "\" has no ";
   result->message =
-      "parameter \"" + entries[result->parameter].name + "\" has no effect on any residual" +
-      (entries.size() > 1 ? ", neither at the initial values nor where the others lead" : "");
+      jumps ? name +
+                  "derivative: the residuals change with it by jumps alone, as accelerations "
+                  "do with the time at which a body stops; other observations, or another "
+                  "initial value, may have one"
+            : name + "effect on any residual" +
+                  (entries.size() > 1 ? ", neither at the initial values nor where the others lead"
+                                      : "");
   return false;
 }
 
@@ -606,18 +621,20 @@ FinishedProfile ProfileOf(const FitRun& run, const FitResult& result, int parame
 Eigen::VectorXd MakeProfiles(FitRun* run, FitResult* result) {
   result->profiles.clear();
   Eigen::VectorXd better;
-  const long most = std::max(kLeastProfileRuns * run->problem->num_blocks(), result->rollouts);
-  const long end = result->rollouts + most;
+  const auto needed = NeedProfiles(run->options, *result, run->problem, &result->rollouts);
+  const long least = kLeastProfileRuns * run->problem->num_blocks();
+  const long most = std::max(least * static_cast<long>(needed.size()), result->rollouts);
+  long end = result->rollouts + most;
   FitParts* const parts = run->log->parts;
   const bool part = parts != nullptr && parts->is_wanted;  // others make the rest
-  for (const auto& [parameter, why] :
-       NeedProfiles(run->options, *result, run->problem, &result->rollouts)) {
+  for (const auto& [parameter, why] : needed) {
     const std::string& name = run->problem->entries()[static_cast<size_t>(parameter)].name;
     if (part && !parts->is_wanted(name)) continue;
     const bool asked = why == kAskedFor;
     const long budget = asked ? std::numeric_limits<long>::max() : end - result->rollouts;
     FinishedProfile done = ProfileOf(*run, *result, parameter, budget);
     result->rollouts += done.rollouts;
+    if (asked) end += done.rollouts;  // what is asked for is not counted
     if (part) {
       parts->made[name] = std::move(done);
       continue;

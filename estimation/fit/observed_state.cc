@@ -264,16 +264,30 @@ Eigen::VectorXd Solve(StateProblem* problem) {
   return x;
 }
 
-/// Whether a path "bodies/NAME/..." ends with a component of a pose or twist.
-bool IsOfState(const std::string& path) {
+/// Whether joints keep the place of their anchor on a body of this name, "*" matching within it.
+bool IsHeldByJoint(const Scene& scene, const std::string& pattern) {
+  return std::any_of(scene.joints.begin(), scene.joints.end(), [&](const BasicJoint<double>& one) {
+    const bool holds = one.type == JointType::kRevolute || one.type == JointType::kPrismatic ||
+                       one.type == JointType::kWeld || one.type == JointType::kDistance;
+    return holds && std::any_of(one.bodies, one.bodies + 2, [&](int body) {
+             return body >= 0 &&
+                    MatchesPattern(pattern, scene.bodies[static_cast<size_t>(body)].name);
+           });
+  });
+}
+
+/// Whether a path "bodies/NAME/..." or "joints/NAME/..." ends with a component of a pose or twist.
+bool IsOfState(const Scene& scene, const std::string& path) {
   const size_t first = path.find('/');
   const size_t second = path.find('/', first + 1);
   if (first == std::string::npos || second == std::string::npos) return false;
   const std::string kind = path.substr(0, first);
   const std::string what = path.substr(second + 1);
-  if (kind == "joints") return what == "angle" || what == "rate";
-  return kind == "bodies" && (what.rfind("position", 0) == 0 || what == "angle" ||
-                              what.rfind("velocity", 0) == 0 || what == "angular_velocity");
+  if (kind == "joints") return what == "angle" || what == "displacement" || what == "rate";
+  if (kind != "bodies") return false;
+  if (what.rfind("velocity", 0) == 0 || what == "angular_velocity") return true;
+  const bool is_pose = what.rfind("position", 0) == 0 || what == "angle";
+  return is_pose && !IsHeldByJoint(scene, path.substr(first + 1, second - first - 1));
 }
 
 }  // namespace
@@ -348,9 +362,9 @@ Eigen::VectorXd ParametersFromObservations(const RolloutResiduals& residuals,
   return p;
 }
 
-bool IsOfInitialState(const FitParameter& parameter) {
+bool IsOfInitialState(const Scene& scene, const FitParameter& parameter) {
   return std::all_of(parameter.sets.begin(), parameter.sets.end(),
-                     [](const ParameterSet& set) { return IsOfState(set.path); });
+                     [&](const ParameterSet& set) { return IsOfState(scene, set.path); });
 }
 
 }  // namespace tangible

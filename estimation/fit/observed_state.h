@@ -55,8 +55,9 @@ State<double> StateFromObservations(const RolloutResiduals& residuals, double ti
 Eigen::VectorXd ParametersFromObservations(const RolloutResiduals& residuals,
                                            const std::vector<bool>& free);
 
-/// Whether a parameter sets nothing but initial poses and twists of bodies, and angles and rates of
-/// joints.
-bool IsOfInitialState(const FitParameter& parameter);
+/// Whether a parameter sets nothing but initial poses and twists of bodies, and angles,
+/// displacements and rates of joints. The position of a body that a hinge, slider, weld or rod holds
+/// is a length: it moves the anchor on the body.
+bool IsOfInitialState(const Scene& scene, const FitParameter& parameter);
 
 }  // namespace tangible

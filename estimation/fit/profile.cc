@@ -363,6 +363,11 @@ std::vector<std::pair<int, std::string>> NeedProfiles(const FitOptions& options,
   const auto num_undetermined =
       std::count_if(intervals.begin(), intervals.end(),
                     [](const ConfidenceInterval& interval) { return !interval; });
+  bool one_at_bound = false;
+  for (int k = 0; k < problem->num_shared() && few; ++k) {
+    one_at_bound =
+        one_at_bound || IsAtBound(entries[static_cast<size_t>(k)], result.estimate[k]);
+  }
   for (int k = 0; k < static_cast<int>(entries.size()); ++k) {
     const ParameterEntry& entry = entries[static_cast<size_t>(k)];
     const auto& asked = options.profiles;
@@ -381,6 +386,9 @@ std::vector<std::pair<int, std::string>> NeedProfiles(const FitOptions& options,
     };
     if (IsAtBound(entry, result.estimate[k])) {
       proposed.emplace_back(k, "at a bound");
+    } else if (one_at_bound && trusting) {
+      // Its interval is that with the other one held there, from which it may leave to one side.
+      proposed.emplace_back(k, "another parameter is at a bound");
     } else if (!trusting) {
       // What is not determined has no profile, unless it alone is not: then it may have one side.
       if (num_undetermined == 1) proposed.emplace_back(k, "no effect at the estimate");

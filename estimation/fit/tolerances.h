@@ -9,6 +9,9 @@ namespace tangible {
 /// Of sigma: a parameter that moves the vector of residuals by no more, changed by its own
 /// magnitude, has no effect.
 inline constexpr double kNoEffect = 1e-12;
+/// Of the cost and 1: with a larger change a parameter without a derivative changes the residuals
+/// by jumps.
+inline constexpr double kJumpsBy = 1e-6;
 /// Of sigma: an effect of that kind that is smaller may be the rounding of effects that cancel. It
 /// is if it changes by kChangesAsRounding of itself where the parameter is moved by kBesideStep of
 /// its magnitude.

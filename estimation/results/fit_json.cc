@@ -224,7 +224,7 @@ class Reader {
   }
 
   void CheckFirstPart(const JsonReader& recording, const FitProblem& problem) const {
-    const std::vector<bool> own = OwnStates(problem.parameters, out_.scopes);
+    const std::vector<bool> own = OwnStates(problem, out_.scopes);
     if (problem.observations.empty() && std::find(own.begin(), own.end(), true) != own.end()) {
       recording.At("state_from")
           .FailExpected(
@@ -361,11 +361,13 @@ class Reader {
     std::vector<bool> free;
     for (size_t i = 0; i < problem->parameters.size(); ++i) {
       const bool own = out_.scopes[i].kind != ParameterScope::Kind::kShared;
-      free.push_back((own || !has_recordings_) && IsOfInitialState(problem->parameters[i]));
+      free.push_back((own || !has_recordings_) &&
+                     IsOfInitialState(problem->scene, problem->parameters[i]));
     }
     if (std::find(free.begin(), free.end(), true) == free.end()) {
       reader.Fail(
-          "expected parameters that set nothing but initial poses, twists, joint angles or rates" +
+          "expected parameters that set nothing but initial poses, twists, joint angles, "
+          "displacements or rates" +
           std::string(has_recordings_ ? ", each per recording" : "") + ", got none");
       return;
     }

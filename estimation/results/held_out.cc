@@ -118,13 +118,13 @@ std::string DescribeErrors(const HorizonError& error) {
 
 }  // namespace
 
-std::vector<bool> OwnStates(const std::vector<FitParameter>& parameters,
-                            const std::vector<ParameterScope>& scopes) {
+std::vector<bool> OwnStates(const FitProblem& problem, const std::vector<ParameterScope>& scopes) {
+  const std::vector<FitParameter>& parameters = problem.parameters;
   std::vector<bool> own;
   own.reserve(parameters.size());
   for (size_t i = 0; i < parameters.size(); ++i) {
     own.push_back(scopes[i].kind != ParameterScope::Kind::kShared &&
-                  IsOfInitialState(parameters[i]));
+                  IsOfInitialState(problem.scene, parameters[i]));
   }
   return own;
 }
@@ -158,7 +158,7 @@ HeldOutRun PredictOne(const FitInput& input, const FitOptions& options,
   }
   run.entries = run.first_part->entries();
   run.parameters = KnownValues(run.entries, problem, estimate);
-  const std::vector<bool> free = OwnStates(one.parameters, input.scopes);
+  const std::vector<bool> free = OwnStates(one, input.scopes);
   for (size_t k = 0; k < free.size(); ++k) {
     if (free[k]) run.fitted.push_back(static_cast<int>(k));
   }

@@ -28,8 +28,7 @@ struct HeldOutRecording {
 
 /// Which parameters of a recording are fitted to its first part: those that it has for itself and
 /// that set nothing but poses and twists at its start.
-std::vector<bool> OwnStates(const std::vector<FitParameter>& parameters,
-                            const std::vector<ParameterScope>& scopes);
+std::vector<bool> OwnStates(const FitProblem& problem, const std::vector<ParameterScope>& scopes);
 
 /// What was found of one.
 struct HeldOutRun {

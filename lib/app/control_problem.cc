@@ -258,7 +258,7 @@ class Reader {
   // True, false or "secants".
   void ReadSecondOrder(const JsonReader& json) {
     if (json.IsString()) {
-      json.Choice({"secants"});
+      if (json.String() != "secants") json.FailExpected("true, false or \"secants\"");
       problem_.options.secants = true;
     } else {
       problem_.options.second_order = json.Boolean();

@@ -33,6 +33,7 @@ struct Judged {
   double seconds = 0.0;  // CPU
   Replay replay;
   double cost_of_nothing = 0.0;
+  double units = 0.0;  // the cost with every residual as large as its target
   PlanVerdict verdict;
   Certificate certificate;
   SearchResult search;  // without `best`, which is the result
@@ -134,7 +135,7 @@ PlanVerdict VerdictOf(const ControlFile& file, const Judged& plan,
                       const UnreachedTargets& unreached) {
   const IlqrResult& result = plan.result;
   const Replay& replay = plan.replay;
-  if (DiffersFromMotion(result.plan.cost, replay, plan.cost_of_nothing)) {
+  if (DiffersFromMotion(result.plan.cost, replay, plan.cost_of_nothing, plan.units)) {
     const std::string why = replay.done ? "the plan's cost is " + CompactNumber(result.plan.cost) +
                                               ", and that of its replay by events " +
                                               CompactNumber(replay.cost)
@@ -142,9 +143,12 @@ PlanVerdict VerdictOf(const ControlFile& file, const Judged& plan,
     return {"differs_from_motion", why, false};
   }
   if (unreached.all) {
+    const bool are_given = (file.high - file.low).maxCoeff() == 0.0;
     return {"no_effect_on_target",
             "the controls have no effect on " + NamesOf(file, unreached.terms) +
-                " from where the plan is; try starts or sampling, another initial, or a surrogate",
+                (are_given ? ": low and high of all of them are equal"
+                           : " from where the plan is; try starts or sampling, another initial, or "
+                             "a surrogate"),
             false};
   }
   return {NameOf(result.status), result.message, true};
@@ -269,11 +273,16 @@ std::string MakePlan(const std::string& name, const ControlFile& file,
   WarnOfDiscreteMap(plan.certificate, &run->warnings);
   plan.replay = ReplayByEvents(file.scene, file.paths, cost, planned.controls);
   plan.cost_of_nothing = CostOfNothing(file, cost, planned.controls.rows());
+  plan.units = cost.ValueOfUnits(planned.controls.rows());
   const UnreachedTargets unreached = FindUnreachedTargets(problem, planned);
   plan.verdict = VerdictOf(file, plan, unreached);
   if (plan.verdict.holds && !unreached.terms.empty()) {
     run->warnings.push_back("the controls have no effect on " + NamesOf(file, unreached.terms) +
                             " from where the plan is");
+  }
+  if (plan.verdict.holds && !unreached.one_sided.empty()) {
+    run->warnings.push_back("the controls have an effect on " + NamesOf(file, unreached.one_sided) +
+                            " on one side of the plan alone, as against a stop");
   }
   run->result = DescribePlan(file, function, plan);
   run->beside_motion = PlannedBesideMotion(function, plan.result, plan.replay);
@@ -491,9 +500,12 @@ std::string RunPredictive(const std::string& name, const ControlFile& file, cons
   if (error.empty()) error = of_plant.Create(plant, {}, file.paths, {});
   if (!error.empty()) return name + ": " + error;
   EngineStep map(function), plant_step(of_plant);
-  error = FindIdle({&map, nullptr, map.initial(), file.low, file.high}, file, function,
-                   file.InitialControls(NumRunSteps(file)));
-  if (!error.empty()) return name + ": " + error;
+  // With starts or sampling a control that moves nothing at first may in the plan that they find.
+  if (!SearchOf(file, options).searches()) {
+    error = FindIdle({&map, nullptr, map.initial(), file.low, file.high}, file, function,
+                     file.InitialControls(NumRunSteps(file)));
+    if (!error.empty()) return name + ": " + error;
+  }
   PredictiveRun made = Control(file, options, &map, &plant_step);
   error = WhyNoResult(made, name, plant_name);
   if (!error.empty()) return error;

@@ -171,6 +171,11 @@ class Solver {
     }
     IlqrIteration iteration{result_.plan.cost, result_.gradient, 0.0, 0.0};
     bool convex = Backward();
+    if (convex && shift_ == 0.0 &&
+        -(linear_ + quadratic_) <= kNoDecrease * std::abs(result_.plan.cost)) {
+      Converge();
+      return false;
+    }
     if (convex) iteration.step = Search();
     if (iteration.step == 0.0 && secants_ && !curvature_.empty()) {
       curvature_.clear();

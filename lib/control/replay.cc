@@ -54,8 +54,9 @@ Replay ReplayByEvents(const Scene& scene, const std::vector<std::string>& paths,
   return replay;
 }
 
-bool DiffersFromMotion(double planned, const Replay& replay, double cost_of_nothing) {
+bool DiffersFromMotion(double planned, const Replay& replay, double cost_of_nothing, double units) {
   if (!replay.done) return true;
+  if (std::abs(replay.cost) <= kMovesToTarget * units) return false;
   const double excess = replay.cost - planned;
   const double least = std::isfinite(cost_of_nothing) ? kNothingShare * cost_of_nothing : 0.0;
   return excess > kMotionShare * std::abs(planned) && excess > least;

@@ -39,7 +39,9 @@ Replay ReplayByEvents(const Scene& scene, const std::vector<std::string>& paths,
 
 /// Whether a plan does not hold in the motion: its replay failed, or cost more than planned by more
 /// than kMotionShare of the plan's cost and kNothingShare of the cost of doing nothing, which is
-/// left out where it is not finite.
-bool DiffersFromMotion(double planned, const Replay& replay, double cost_of_nothing);
+/// left out where it is not finite. A replay that meets its targets holds: one that costs at most
+/// kMovesToTarget of `units`, the cost with every residual as large as its target
+/// (Cost::ValueOfUnits).
+bool DiffersFromMotion(double planned, const Replay& replay, double cost_of_nothing, double units);
 
 }  // namespace tangible

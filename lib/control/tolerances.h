@@ -50,6 +50,12 @@ inline constexpr double kMotionShare = 0.05;
 /// Of the cost of doing nothing: a smaller excess does not matter, whatever it is a share of. A
 /// plan that meets its target has a cost of rounding.
 inline constexpr double kNothingShare = 1e-6;
+/// Of the cost with every residual as large as its target, and at least 1: a motion that costs less
+/// meets its targets to 1e-5, and what it costs beside a plan of no cost is the integrator's error.
+inline constexpr double kMovesToTarget = 1e-10;
+/// Of the cost: a plan whose best step would decrease it by less, by the quadratic without a shift,
+/// is at its least cost; what is left of a gradient is rounding.
+inline constexpr double kNoDecrease = 1e-13;
 /// Of a target, at least 1: a target is met within it. Plans weigh targets against efforts, and
 /// joints and contacts hold what they hold to less.
 inline constexpr double kMetTarget = 1e-6;

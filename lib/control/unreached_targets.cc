@@ -21,6 +21,10 @@ struct Term {
   double effect = 0.0;    // the largest change
 };
 
+// Of all controls: plans beside a plan, which tell whether it is at the end of what a target's
+// controls can do, as against a stop.
+constexpr double kBeside[] = {0.99, 1.01};
+
 class Effects {
  public:
   Effects(const ControlProblem& problem, const Plan& plan)
@@ -64,6 +68,40 @@ class Effects {
     return unreached;
   }
 
+  // Takes out the terms that change with the plan's controls all a little smaller or larger.
+  void TakeOneSided(UnreachedTargets* unreached) {
+    std::vector<char> changes(terms_.size(), 0);
+    const long steps = plan_.controls.rows();
+    const auto compare = [&](const VectorX<double>& own, const VectorX<double>& x,
+                             const VectorX<double>& u, bool at_end) {
+      for (const int i : unreached->terms) {
+        const CostTerm& term = p_.cost->terms()[static_cast<size_t>(i)];
+        const double unit = std::max(1.0, std::abs(term.target));
+        if (term.at_end != at_end) continue;
+        const double change = std::abs(ResidualOf(term, x, u) - ResidualOf(term, own, u));
+        if (change > kMetTarget * unit) changes[static_cast<size_t>(i)] = 1;
+      }
+    };
+    for (const double share : kBeside) {
+      VectorX<double> x = plan_.states.row(0), next;
+      std::string error;
+      long k = 0;
+      for (; k < steps; ++k) {
+        VectorX<double> u = share * plan_.controls.row(k).transpose();
+        u = u.cwiseMax(p_.low).cwiseMin(p_.high);
+        compare(plan_.states.row(k), x, u, false);
+        if (!p_.map->Step(p_.first_step + k, x, u, &next, &error)) break;
+        x.swap(next);
+      }
+      if (k == steps) compare(plan_.states.row(steps), x, VectorX<double>(), true);
+    }
+    for (const int i : unreached->terms) {
+      if (changes[static_cast<size_t>(i)] != 0) unreached->one_sided.push_back(i);
+    }
+    std::erase_if(unreached->terms, [&](int i) { return changes[static_cast<size_t>(i)] != 0; });
+    unreached->all = unreached->all && unreached->one_sided.empty();
+  }
+
  private:
   static bool IsTarget(const CostTerm& term) {
     return term.kind != CostTerm::Kind::kControl && term.weight > 0.0;
@@ -90,7 +128,10 @@ class Effects {
 
 UnreachedTargets FindUnreachedTargets(const ControlProblem& problem, const Plan& plan) {
   Effects effects(problem, plan);
-  return effects.Find() ? effects.Unreached() : UnreachedTargets();
+  if (!effects.Find()) return {};
+  UnreachedTargets unreached = effects.Unreached();
+  if (!unreached.terms.empty()) effects.TakeOneSided(&unreached);
+  return unreached;
 }
 
 }  // namespace tangible

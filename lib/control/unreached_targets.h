@@ -17,6 +17,9 @@ struct UnreachedTargets {
   std::vector<int> terms;
   /// Whether these are all the terms that it does not meet; terms of controls are no targets.
   bool all = false;
+  /// Terms without effect to first order that change with controls that are all 1 % smaller or
+  /// larger: a cart that is pushed against its stop goes no further, but may stay back.
+  std::vector<int> one_sided;
 };
 
 /// Of a plan whose states its controls cause. A target is met within kMetTarget of itself, or of 1

@@ -124,6 +124,30 @@ TEST(Ilqr, OfALinearQuadraticProblemIsRiccatis) {
   }
 }
 
+// A cart is driven to its target by a force of little cost: the gradient's rounding, in proportion to
+// the weight of the end, stays above its tolerance where no step decreases the cost any more.
+TEST(Ilqr, ConvergesWhereOnlyRoundingIsLeft) {
+  const double h = 0.05, mass = 2.0;
+  MatrixX<double> a(2, 2), b(2, 1);
+  a << 1.0, h, 0.0, 1.0;
+  b << 0.5 * h * h / mass, h / mass;
+  for (const double force : {1e-6, 1e-3, 1.0}) {
+    for (const double end : {1.0, 100.0, 1e6}) {
+      for (const int steps : {20, 200, 1000}) {
+        Linear map(a, b);
+        const Cost cost(2, 1, h,
+                        {{CostTerm::Kind::kControl, 0, 0, {0, 0}, 0.0, force, false},
+                         {CostTerm::Kind::kState, 0, 0, {0, 0}, 1.0, end, true},
+                         {CostTerm::Kind::kState, 1, 0, {0, 0}, 0.0, end, true}});
+        const ControlProblem problem = ProblemOf(&map, &cost, VectorX<double>::Zero(2), kInfinity);
+        const IlqrResult found = SolveIlqr(problem, RowMatrixXd::Zero(steps, 1), {});
+        EXPECT_EQ(found.status, IlqrStatus::kConverged) << found.message << " " << steps;
+        EXPECT_LE(found.iterations.size(), 4u) << force << " " << end << " " << steps;
+      }
+    }
+  }
+}
+
 TEST(Ilqr, SwingsAPendulumUpWithinItsBounds) {
   Pendulum map;
   const Cost cost = SwingUp();

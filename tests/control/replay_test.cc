@@ -120,11 +120,11 @@ TEST(Replay, TellsASwingUpThatFailsInTheMotion) {
   }
   // The integrator's error at the plan's step.
   EXPECT_NEAR(events.replay.cost, events.result.plan.cost, 1e-6 * events.result.plan.cost);
-  EXPECT_FALSE(DiffersFromMotion(events.result.plan.cost, events.replay, events.nothing));
+  EXPECT_FALSE(DiffersFromMotion(events.result.plan.cost, events.replay, events.nothing, 1.0));
   EXPECT_NEAR(events.replay.states(events.replay.states.rows() - 1, 2), kPi, 0.1);
   EXPECT_LT(fixed.result.plan.cost, 1.0);
   EXPECT_GT(fixed.replay.cost, 100.0);
-  EXPECT_TRUE(DiffersFromMotion(fixed.result.plan.cost, fixed.replay, fixed.nothing));
+  EXPECT_TRUE(DiffersFromMotion(fixed.result.plan.cost, fixed.replay, fixed.nothing, 1.0));
 }
 
 TEST(Replay, ADoublePendulumEndsWhereAnIntegrationInAnglesDoes) {
@@ -144,16 +144,16 @@ TEST(Replay, ADoublePendulumEndsWhereAnIntegrationInAnglesDoes) {
   const double got[4] = {last[2], last[8], last[5], last[11]};
   // Of the replay: near the top errors of 1e-9 of the integrator grow a thousand times.
   for (size_t i = 0; i < 4; ++i) EXPECT_NEAR(got[i], y[i], i < 2 ? 1e-6 : 1e-5) << i;
-  EXPECT_FALSE(DiffersFromMotion(plan.result.plan.cost, plan.replay, plan.nothing));
+  EXPECT_FALSE(DiffersFromMotion(plan.result.plan.cost, plan.replay, plan.nothing, 1.0));
 }
 
 TEST(Replay, DiffersOnlyAboveBothShares) {
   Replay replay;
-  EXPECT_TRUE(DiffersFromMotion(1.0, replay, 1.0));  // it failed
+  EXPECT_TRUE(DiffersFromMotion(1.0, replay, 1.0, 1.0));  // it failed
   replay.done = true;
   const auto differs = [&](double cost, double nothing) {
     replay.cost = cost;
-    return DiffersFromMotion(1.0, replay, nothing);
+    return DiffersFromMotion(1.0, replay, nothing, 1.0);
   };
   EXPECT_FALSE(differs(1.049, 1.0));
   EXPECT_TRUE(differs(1.051, 1.0));
@@ -161,6 +161,18 @@ TEST(Replay, DiffersOnlyAboveBothShares) {
   EXPECT_TRUE(differs(1.2, 1e5));
   EXPECT_FALSE(differs(0.1, 1.0));
   EXPECT_TRUE(differs(1.051, std::nan("")));
+}
+
+// Where nothing has to be done, or a plan costs nothing, shares of the costs are rounding.
+TEST(Replay, AMotionThatMeetsItsTargetsHolds) {
+  Replay replay;
+  replay.done = true;
+  replay.cost = 8e-26;
+  EXPECT_FALSE(DiffersFromMotion(2e-28, replay, 8e-26, 50.0));
+  replay.cost = 1.2e-10;
+  EXPECT_FALSE(DiffersFromMotion(4e-19, replay, 0.0, 55.0));
+  replay.cost = 1e-8;
+  EXPECT_TRUE(DiffersFromMotion(4e-19, replay, 0.0, 55.0));
 }
 
 }  // namespace

@@ -87,6 +87,43 @@ TEST(UnreachedTargets, NamesOnlyThoseWithoutEffect) {
   EXPECT_TRUE(scene.Find(terms, 0.5).terms.empty());
 }
 
+// A cart that goes by its control, x⁺ = min(x + u, 1), and no further than its stop.
+class CartToAStop : public StepMap {
+ public:
+  int num_states() const override { return 1; }
+  int num_controls() const override { return 1; }
+  bool Step(long, const VectorX<double>& x, const VectorX<double>& u, VectorX<double>* next,
+            std::string*) override {
+    *next = (x + u).cwiseMin(1.0);
+    return true;
+  }
+  bool Linearise(long k, const VectorX<double>& x, const VectorX<double>& u, VectorX<double>* next,
+                 MatrixX<double>* a, MatrixX<double>* b, std::string* error) override {
+    const double moves = x[0] + u[0] < 1.0 ? 1.0 : 0.0;
+    *a = MatrixX<double>::Constant(1, 1, moves);
+    *b = *a;
+    return Step(k, x, u, next, error);
+  }
+};
+
+// A target behind the stop: pushed against it the cart has no derivative, but stays back with less
+// effort. Pushed far beyond it, it has none either with 1 % less.
+TEST(UnreachedTargets, AStopIsReachedFromOneSide) {
+  CartToAStop map;
+  const Cost cost(1, 1, 0.1, {{Kind::kState, 0, 0, {0, 0}, 2.0, 1.0, true}});
+  const VectorX<double> none = VectorX<double>::Zero(1), bound = VectorX<double>::Constant(1, 3.0);
+  for (const double u : {0.5, 3.0}) {
+    Plan plan;
+    plan.controls = RowMatrixXd::Constant(2, 1, u);
+    plan.states = RowMatrixXd::Zero(3, 1);
+    plan.states(1, 0) = std::min(u, 1.0);
+    plan.states(2, 0) = 1.0;
+    const UnreachedTargets found = FindUnreachedTargets({&map, &cost, none, -bound, bound}, plan);
+    EXPECT_EQ(found.all, u == 3.0);
+    EXPECT_EQ(found.one_sided, u == 3.0 ? std::vector<int>{} : std::vector<int>{0});
+  }
+}
+
 // Half a turn from its target the cost of an angle that wraps has no gradient, but controls do
 // turn the rod.
 TEST(UnreachedTargets, AnAngleAtTheMaximumOfItsCostIsReached) {

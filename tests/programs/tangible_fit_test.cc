@@ -271,7 +271,7 @@ TEST_F(TangibleFitTest, ASingleRunBeginsWhereTheObservationsSay) {
   fit["parameters"].erase(1);
   ExpectOneLine(Fit(fit), 1,
                 "fit.json: /initial: expected parameters that set nothing but initial poses, "
-                "twists, joint angles or rates, got none");
+                "twists, joint angles, displacements or rates, got none");
 }
 
 TEST_F(TangibleFitTest, WithoutAnEstimateWhatNeedsOneIsNotWritten) {

@@ -159,7 +159,9 @@ void ContactSearch::FindLimits(const Model<double>& model, const State<double>& 
     EvaluateLimitRows(model.parameters[LimitNumber(joint, limit)], scratch.joints[limit.joint],
                       limit, &rows);
     limit.gap = rows.geometry.gap;
-    if (limit.gap <= structure.settings.contact_margin + h * limit_bound_[limit.joint]) {
+    const double reach =
+        kListedBeyond * (structure.settings.contact_margin + h * limit_bound_[limit.joint]);
+    if (limit.gap <= reach) {
       limit.law = GapLaw(limit.gap, h, structure.settings);
       if (Rebounds(model, state, h, limit, rows)) limit.law = ContactLaw::kRestitution;
       contacts->push_back(limit);
@@ -192,9 +194,23 @@ ContactsAhead ContactSearch::FindPassed(const Model<double>& model, const State<
   return ahead;
 }
 
+// Whether a corner passes another one by before it comes down to the face that ends there.
+bool ContactSearch::PassesCorner(const Model<double>& model, const State<double>& state,
+                                 const ActiveContact& contact, double approach, double h) const {
+  for (const int body : {contact.a, contact.b}) {
+    const ShapeType shape = model.structure->bodies[body].shape;
+    if (shape == ShapeType::kCircle || shape == ShapeType::kHalfPlane) return false;
+  }
+  const double rounding = lengths_.Rounding(state, contact.a, contact.b);
+  const double slow = kNoApproach * (bound_[contact.a] + bound_[contact.b]) + rounding / h;
+  const double size = std::min(lengths_.radius(contact.a), lengths_.radius(contact.b));
+  return approach < -slow && contact.gap > lengths_.Touch(state, contact.a, contact.b) &&
+         PassesBy(model, state, contact, approach, size, slow);
+}
+
 // How far a body's box reaches beyond its shape, m: so that boxes of bodies that may touch overlap.
 double ContactSearch::GrowthOf(const Model<double>& model, double h, int body) const {
-  return 0.5 * model.structure->settings.contact_margin + h * bound_[body];
+  return kListedBeyond * (0.5 * model.structure->settings.contact_margin + h * bound_[body]);
 }
 
 Aabb ContactSearch::BoxAt(const Model<double>& model, const State<double>& state,
@@ -266,7 +282,7 @@ void ContactSearch::FindPairs(const Model<double>& model, const State<double>& s
 double ContactSearch::ReachOf(const Model<double>& model, const State<double>& state, double h,
                               int a, int b) const {
   const ModelStructure& structure = *model.structure;
-  double reach = structure.settings.contact_margin + h * (bound_[a] + bound_[b]);
+  double reach = kListedBeyond * (structure.settings.contact_margin + h * (bound_[a] + bound_[b]));
   for (const int body : {a, b}) {
     if (structure.bodies[body].shape == ShapeType::kHalfPlane) {
       const double distance = std::hypot(state.pose[3 * a] - state.pose[3 * b],
@@ -307,6 +323,7 @@ void ContactSearch::FindContacts(const Model<double>& model, const State<double>
         k = -1;
         continue;
       }
+      if (PassesCorner(model, state, contact, approach, h)) continue;
     }
     if (Rebounds(model, state, h, contact, rows)) contact.law = ContactLaw::kRestitution;
     contacts->push_back(contact);
@@ -344,8 +361,8 @@ void ContactSearch::Find(const Model<double>& model, const State<double>& state,
     ActiveContact contact;
     contact.a = pair.first;
     contact.b = pair.second;
-    const double reach = 0.5 * model.structure->settings.contact_margin +
-                         h * std::max(bound_[contact.a], bound_[contact.b]);
+    const double reach = kListedBeyond * (0.5 * model.structure->settings.contact_margin +
+                                          h * std::max(bound_[contact.a], bound_[contact.b]));
     ForEachPartNear(model, contact.a, scratch.poses[contact.a], boxes_[contact.a], contact.b,
                     scratch.poses[contact.b], boxes_[contact.b], reach, [&](PartPair parts) {
                       FindContacts(model, state, h, scratch, contact, parts, contacts);

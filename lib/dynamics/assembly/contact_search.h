@@ -49,6 +49,8 @@ class ContactSearch {
                              std::vector<ActiveContact>* contacts);
 
  private:
+  bool PassesCorner(const Model<double>& model, const State<double>& state,
+                    const ActiveContact& contact, double approach, double h) const;
   ContactsAhead FindPassed(const Model<double>& model, const State<double>& state,
                            const ActiveContact& contact, double approach, double h) const;
   Aabb BoxAt(const Model<double>& model, const State<double>& state,

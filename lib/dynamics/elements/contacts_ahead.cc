@@ -46,4 +46,24 @@ ContactsAhead FindContactsAhead(const Model<double>& model, const State<double>&
   return ahead;
 }
 
+bool PassesBy(const Model<double>& model, const State<double>& state, const ActiveContact& contact,
+              double approach, double size, double slow) {
+  const double time = (contact.gap + kCorner * size) / -approach;
+  const Pose<double> pose_a = Moved(state, contact.a, time), pose_b = Moved(state, contact.b, time);
+  ContactFeature features[2];
+  const int count = FindFeatures(model, contact.a, pose_a, contact.b, pose_b, contact.Parts(),
+                                 std::numeric_limits<double>::infinity(), features);
+  for (int k = 0; k < count; ++k) {
+    ActiveContact next = contact;
+    next.feature = features[k];
+    if (next.SameAs(contact)) return false;
+    ContactRows<double> rows;
+    EvaluateContactRows(model, pose_a, pose_b, next, &rows);
+    if (RelativeSpeed(state, contact.a, rows.normal_a, contact.b, rows.normal_b) < -slow) {
+      return false;
+    }
+  }
+  return count > 0;
+}
+
 }  // namespace tangible

@@ -36,6 +36,9 @@ inline constexpr double kCorner = 1e-6;
 /// Of the bound of a speed: a speed that exceeds its bound by less is rounding, and no search is
 /// repeated.
 inline constexpr double kSpeedBound = 1e-12;
+/// Of the distance within which contacts may close in a fixed step: those a little beyond it are
+/// listed too, so that certificates see what just fails to close.
+inline constexpr double kListedBeyond = 1.000004;
 
 /// Of m, the squared ratio of the speeds of a disc's centre and rim: nearer to 1 the elliptic
 /// integrals of its support are those at this distance, because they are infinite at 1.

@@ -344,6 +344,55 @@ void RolloutCertifier::AddDiscreteMap(const Model<double>& model, long step,
       made_last_ = text + " in the last step";
     }
   }
+  if (certificate_.discrete_map.empty()) {
+    certificate_.discrete_map = EdgeThatLetsGo(model, step, record);
+  }
+}
+
+std::string RolloutCertifier::EdgeThatLetsGo(const Model<double>& model, long step,
+                                             const StepRecord& record) {
+  const ModelStructure& s = *model.structure;
+  const double near = kSameInstant * s.settings.dt;
+  // Where the force has too small a part of the step, friction lets go in the next one.
+  std::string edge = std::exchange(held_edge_, "");
+  const auto check = [&](const ForceIndex& force, int number, const char* which) {
+    if (!Wanted(number)) return;
+    const double time = model.parameters[number];
+    if (time > record.time + near && time < record.time + record.h - near) {
+      edge = std::string(which) + " of force " + force.name;
+      held_edge_ = edge;
+    }
+  };
+  for (const ForceIndex& force : s.forces) {
+    check(force, force.start, "start");
+    check(force, force.end, "end");
+  }
+  if (edge.empty()) return "";
+  State<double> after = record.before;
+  after.twist = record.new_twist;
+  const auto starts = [](double before, double then) {
+    return std::abs(before) <= kNoSlip * std::abs(then) && then != 0.0;
+  };
+  bool lets_go = false;
+  for (size_t i = 0; i < record.contacts.size(); ++i) {
+    if (!record.problem.contacts[i].has_friction || record.contacts[i].is_rolling ||
+        SlidingSign(record.solution.modes[i]) == 0.0) {
+      continue;
+    }
+    lets_go = lets_go || starts(SpeedsOf(model, record.before, record.contacts[i]).slip,
+                                SpeedsOf(model, after, record.contacts[i]).slip);
+  }
+  for (const SupportIndex& support : s.supports) {
+    const auto largest = [&](const std::vector<double>& twist) {
+      const double* of = &twist[3 * static_cast<size_t>(support.body)];
+      return std::max({std::abs(of[0]), std::abs(of[1]), std::abs(of[2])});
+    };
+    lets_go = lets_go || starts(largest(record.before.twist), largest(record.new_twist));
+  }
+  if (!lets_go) return "";
+  held_edge_.clear();
+  return "step " + std::to_string(step) + ", t = " + Short(record.time) + " s: " + edge +
+         ", as friction lets go";
 }
 
 void RolloutCertifier::AddStep(const Model<double>& model, long step, Stepper* stepper) {

@@ -88,6 +88,10 @@ class RolloutCertifier {
   void AddSprings(const Model<double>& model, double time, const State<double>& before,
                   const State<double>& after);
   void AddDiscreteMap(const Model<double>& model, long step, const StepRecord& record);
+  /// An edge of a force's window, as a parameter, within a step in which friction lets go: it acts
+  /// against the part that the force has of the step, where in the motion it does so from the edge
+  /// on. Empty where there is none.
+  std::string EdgeThatLetsGo(const Model<double>& model, long step, const StepRecord& record);
   void AddEventStep(const Model<double>& model, long step, Stepper* stepper);
   void AddIsland(const Model<double>& model, long step, EventDerivative* derivative,
                  IslandRecord* island);
@@ -173,6 +177,7 @@ class RolloutCertifier {
   int last_redundant_ = 0;
   // For event stepping: contacts that carry a force, the bodies that the last impact moved, and
   // when.
+  std::string held_edge_;  ///< an edge of EdgeThatLetsGo in the last step, if it held then
   std::vector<ActiveContact> loaded_;
   std::vector<double> struck_at_;  ///< for each body: the time of its last impact, s
   /// A contact, of the whole model, of an impact at a time (s).

@@ -376,6 +376,14 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
       largest = std::max(largest, share.normal_impulse[i]);
     }
   }
+  // Of bodies that rest on their supports without a load, forces are rounding beside what these
+  // could hold.
+  double rounding = 0.0;
+  for (const SupportIndex& support : s.supports) {
+    const double* x = &model.parameters[support.numbers];
+    rounding =
+        std::max(rounding, kForceTolerance * x[SupportIndex::kFriction] * x[SupportIndex::kLoad]);
+  }
   // The motion that follows an instant starts with the same forces, and knows which contacts at
   // their limit it releases.
   const bool motion_follows = segment->length == 0.0 && segment->event == EventKind::kStepEnd;
@@ -390,7 +398,7 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
     };
     if (!contact.IsPureFriction()) {
       if (!motion_follows) add_margin(largest > 0.0 ? normal / largest : 0.0, "normal force");
-      if (normal > kLoaded * largest) {
+      if (normal > std::max(kLoaded * largest, rounding)) {
         loaded_.push_back(contact);
       }
     }

@@ -266,7 +266,10 @@ void EventSearch::TryStart(const Model<double>& model, double tolerance, Event t
                                                   trial.sign, late);
     if (motion.num_stages > 1 && !(last < -tolerance)) return;
     // A solve, before the motions that follow: in a pile the share of a contact is often redundant.
-    if (!IsDetermined(trial, &At(model, length)->motion.stages[0])) return;
+    if (!IsDetermined(trial, &At(model, length)->motion.stages[0])) {
+      lets_go_with_others_ = lets_go_with_others_ || has_held_;
+      return;
+    }
   }
   // Where bodies jam they are thrown about by much more than their loads, in motions that are given
   // up.
@@ -426,8 +429,23 @@ bool EventSearch::IsShared(const Model<double>& model, const Event& trial) {
          !IsDetermined(trial, &At(model, segment_->length)->motion.stages[0]);
 }
 
+// Whether bodies at rest on their supports share the force of an event with these: whether all of
+// them hold is decided after the motion.
+bool EventSearch::IsSharedWithSupports(const Model<double>& model, const Event& trial) {
+  if (!has_held_ || trial.kind == EventKind::kSlipEnds ||
+      IsDetermined(trial, &At(model, segment_->length)->motion.stages[0])) {
+    return false;
+  }
+  lets_go_with_others_ = true;
+  return true;
+}
+
 void EventSearch::SearchClosed(const Model<double>& model, Event* event) {
   if (segment_->contacts.empty()) return;
+  const std::vector<SupportState>& supports = segment_->before.supports;
+  has_held_ = std::any_of(supports.begin(), supports.end(), [](const SupportState& at) {
+    return at.holds != SupportState::kNothing;
+  });
   // Of few contacts a search in their order costs little.
   const size_t first = segment_->contacts.size() < kManyContacts ? 0 : FirstToEnd(model, *event);
   for (size_t k = 0; k < segment_->contacts.size() && !event->at_start; ++k) {
@@ -446,6 +464,7 @@ void EventSearch::SearchClosed(const Model<double>& model, Event* event) {
       }
       const auto f = [&](Sample& sample) { return ModeValue(model, &sample, trial); };
       const auto ends_between = [&](double a, double fa, double b, double fb) {
+        if (IsSharedWithSupports(model, trial)) return;
         trial.length = Refine(model, f, std::max(kLocatedOfSize * at_start, located), a, fa, b, fb);
         trial.at_once =
             trial.length < kShortestPart * b && f(*At(model, trial.length)) < -tolerance;
@@ -470,7 +489,8 @@ void EventSearch::SearchClosed(const Model<double>& model, Event* event) {
         }
         // At the end of the motion the function has reached 0 to rounding: the event is there. The
         // next motion could not find it, because its function would start at 0.
-        if (share == 1.0 && fb <= tolerance && event->kind != trial.kind) {
+        if (share == 1.0 && fb <= tolerance && event->kind != trial.kind &&
+            !IsSharedWithSupports(model, trial)) {
           trial.length = b;
           *event = trial;
           return;
@@ -604,6 +624,7 @@ bool EventSearch::Run(const Model<double>& model, const std::vector<ActiveContac
   num_samples_ = 0;
   has_start_ = false;
   all_good_ = true;
+  lets_go_with_others_ = false;
   const long most = kEvaluationsOfEvent * num_pairs_with_events_ *
                     (1L + model.structure->settings.max_events_per_step);
   if (evaluations_ > most) {

@@ -65,6 +65,16 @@ class EventSearch {
   /// Whether the next search keeps the modes of such contacts.
   void KeepStarts(bool keeps) { keeps_starts_ = keeps; }
 
+  /// Whether the last search has found a support, or a contact beside one, beyond its limit whose
+  /// share others could take, so that no event lets it go.
+  bool lets_go_with_others() const { return lets_go_with_others_; }
+  /// The state after a motion of this length of the segment of the last search; null where it
+  /// cannot be integrated.
+  const State<double>* StateAfter(const Model<double>& model, double length) {
+    const Sample* const sample = At(model, length);
+    return sample->good ? &sample->motion.after : nullptr;
+  }
+
   /// A closed contact whose feature another one of its pair replaces.
   struct HandOver {
     ActiveContact lost, next;
@@ -157,6 +167,7 @@ class EventSearch {
   /// Whether they differ after a motion of this length, and the rates at which contacts then go.
   bool Departs(const Model<double>& model, double length, std::vector<ReleaseRate>* rates);
   bool IsShared(const Model<double>& model, const Event& trial);
+  bool IsSharedWithSupports(const Model<double>& model, const Event& trial);
   static void SetEvent(const Event& event, Segment* segment);
   /// Whether loads change in a motion and rows share forces that are not determined.
   bool SharesChange(const Model<double>& model, double length);
@@ -213,6 +224,8 @@ class EventSearch {
   int num_pairs_with_events_ = 1;
   bool ends_at_start_ = false;
   bool keeps_starts_ = false;
+  bool has_held_ = false;  ///< supports hold something in the segment
+  bool lets_go_with_others_ = false;
   bool shares_ = false;   ///< SharesChange of the segment
   bool all_good_ = true;  ///< all samples of this search could be integrated
   std::vector<std::pair<int, int>> pairs_;

@@ -668,7 +668,8 @@ EventStepper::Tried EventStepper::TryMotion(const Model<double>& model, double n
   }
   if (!model.structure->servos.empty()) HoldServos(model, &flow_, segment);
   std::string message;
-  bool moved = search_.Run(model, touching_.contacts, segment, &message);
+  bool moved = search_.Run(model, touching_.contacts, segment, &message) &&
+               EndWhereShareEnds(model, segment, &message);
   // Where motions have to be shortened.
   if (moved && tries->halvings > 0 && GainsEnergy(model, *segment)) {
     moved = false;
@@ -702,6 +703,7 @@ StepReport EventStepper::Advance(const Model<double>& model, double t, double h,
   jammed_.clear();
   // What supports hold while their friction is sought may have no accelerations.
   limited_ = !model.structure->supports.empty();
+  times_share_ended_ = 0;
   counts_.Clear();
   shortened_.Clear();
   last_rebounds_.Clear();

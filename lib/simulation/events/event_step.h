@@ -181,6 +181,11 @@ class EventStepper {
   bool LimitJointFriction(Segment* segment) const;
   bool StopSupports(const Model<double>& model, const Segment& segment, int parts,
                     State<double>* state, StepReport* outcome);
+  /// Ends a motion at the instant until which bodies at rest hold together what the support of one
+  /// could not. False with a message where the motion until then cannot be integrated.
+  bool EndWhereShareEnds(const Model<double>& model, Segment* segment, std::string* message);
+  /// Whether what supports hold in a segment they hold as well with the loads after `length` of it.
+  bool HoldsAfter(const Model<double>& model, const Segment& segment, double length);
   /// Shortens a motion to what the contacts of ellipses allow (ellipse_motion.h): to the next
   /// multiple of dt / 2^k. Near states have the same k, so that its end is a given instant and
   /// derivatives are exact.
@@ -281,6 +286,10 @@ class EventStepper {
   SolvedNode idle_;   ///< the same with held modes, where contacts have no load
   std::vector<ActiveContact> listed_contacts_;  ///< of it, before their modes are chosen
   std::vector<CoefficientSource> listed_friction_;
+  Segment trial_;  ///< of HoldsAfter, and what it leaves as it was
+  SupportModes trial_supports_;
+  EventGuess trial_guess_;
+  int times_share_ended_ = 0;  ///< in this step
   EventGuess guess_;
   EventCounts counts_;              ///< of this step
   Rebounds last_rebounds_;          ///< of this step

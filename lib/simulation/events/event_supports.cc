@@ -10,6 +10,12 @@
 #include "tangible/simulation/events/tolerances.h"
 
 namespace tangible {
+namespace {
+
+// How often in a step bodies that hold together are let go at the instant until which they do.
+constexpr int kMostShareEnds = 20;
+
+}  // namespace
 
 bool EventStepper::ChooseModes(const Model<double>& model, const State<double>& state,
                                StepReport* outcome, Segment* segment) {
@@ -101,6 +107,60 @@ bool EventStepper::LimitJointFriction(Segment* segment) const {
     any = true;
   }
   return any;
+}
+
+bool EventStepper::HoldsAfter(const Model<double>& model, const Segment& segment, double length) {
+  const State<double>* const after = search_.StateAfter(model, length);
+  if (after == nullptr) return true;
+  trial_.time = segment.time + length;
+  trial_.length = segment.length;
+  trial_.middle = segment.middle;
+  trial_.starts = false;
+  trial_.before = *after;
+  TakeHeldSpeeds(*model.structure, segment.before.supports, &trial_.before.twist);
+  trial_.before.servo_modes.clear();
+  trial_.before.supports.clear();
+  trial_supports_ = supports_;
+  trial_guess_ = guess_;
+  supports_.Moved();
+  FindTouching(model, trial_.before);
+  StepReport unused;
+  const bool chosen = ChooseModes(model, trial_.before, &unused, &trial_) && unused.message.empty();
+  bool holds = true;
+  for (size_t k = 0; chosen && k < segment.before.supports.size(); ++k) {
+    holds = holds && (segment.before.supports[k].holds == SupportState::kNothing ||
+                      trial_.before.supports[k].holds == segment.before.supports[k].holds);
+  }
+  std::swap(supports_, trial_supports_);
+  std::swap(guess_, trial_guess_);
+  FindTouching(model, segment.before);
+  return holds;
+}
+
+// Bodies at rest that touch, or that joints connect, hold together what the support of one could
+// not, and no function of one share tells when that ends. As the load grows it is decided after a
+// motion as it was before it. What lets go has no acceleration yet, so that derivatives do not
+// depend on the instant: it is given, as that of a signal's corner.
+bool EventStepper::EndWhereShareEnds(const Model<double>& model, Segment* segment,
+                                     std::string* message) {
+  const EventKind event = segment->event;
+  const bool changes_supports =
+      event == EventKind::kSupportStops || event == EventKind::kSupportLetsGo;
+  if (!search_.lets_go_with_others() || search_.ends_at_start() || changes_supports ||
+      event == EventKind::kTouch || times_share_ended_ >= kMostShareEnds ||
+      HoldsAfter(model, *segment, segment->length)) {
+    return true;
+  }
+  ++times_share_ended_;
+  const double whole = segment->length;
+  double low = 0.0, high = whole;
+  while (high - low > kShareEnds * whole) {
+    const double middle = 0.5 * (low + high);
+    (HoldsAfter(model, *segment, middle) ? low : high) = middle;
+  }
+  segment->length = high;
+  segment->middle = segment->time + 0.5 * high;
+  return search_.Run(model, touching_.contacts, segment, message);
 }
 
 void TakeHeldSpeeds(const ModelStructure& structure, const std::vector<SupportState>& supports,

@@ -227,7 +227,10 @@ void EventSearch::SearchLetsGo(const Model<double>& model, int support, Event* e
       a = b;
       continue;
     }
-    if (!TakeDeterminedShare(model, support, EndOf(model, At(model, b)), &beyond)) return;
+    if (!TakeDeterminedShare(model, support, EndOf(model, At(model, b)), &beyond)) {
+      lets_go_with_others_ = true;
+      return;
+    }
     next = beyond;
     const double left = value_of(*At(model, b));
     // More than it can hold is what joints hold as well, or the rest of what they should: a force

@@ -149,6 +149,29 @@ TEST(FitTest, AParameterWithoutEffectIsNamed) {
   EXPECT_NE(fit.message.find("\"bodies/ball/friction\" has no effect"), std::string::npos);
 }
 
+// A block on a table slows down by μ g until it stops: its accelerations change with its speed by a
+// jump at the time of the stop, so that the speed alone has no derivative, and an effect.
+TEST(FitTest, AParameterThatActsByJumpsAloneIsNotWithoutEffect) {
+  const Scene scene = MakeScene(R"({"gravity": [0, 0], "bodies": [
+      {"name": "block", "mass": 1, "inertia": 1, "position": [0, 0], "velocity": [1, 0],
+       "support": {"friction": 0.2}}],
+    "simulation": {"stepping": "event", "dt": 0.01, "duration": 0.8}})");
+  std::vector<Observation> observations;
+  for (int k = 1; k < 80; ++k) {
+    Observation one;
+    one.body = 0;
+    one.coordinate = Coordinate::kAx;
+    one.time = 0.01 * k - 0.005;
+    one.value = one.time < 1.0 / (0.2 * 9.81) ? -0.2 * 9.81 : 0.0;
+    one.sigma = 0.1;
+    observations.push_back(one);
+  }
+  const FitResult fit = FitTo(scene, {Parameter("bodies/block/velocity/x", 1.3)}, observations);
+  EXPECT_EQ(fit.status, FitStatus::kNoEffect);
+  EXPECT_NE(fit.message.find("\"bodies/block/velocity/x\" has no derivative"), std::string::npos)
+      << fit.message;
+}
+
 // With more friction than stops a disc's lowest point in its impact it does nothing at the start.
 TEST(FitTest, FrictionIsFoundFromAStartAtWhichItSticks) {
   const Scene scene = MakeScene(R"({"bodies": [

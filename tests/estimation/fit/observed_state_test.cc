@@ -130,7 +130,8 @@ TEST(ObservedStateTest, JointAnglesAndRatesFromAngles) {
       Parameter("bodies/lower/mass", 1.5)};
   ASSERT_TRUE(parameterized.Create(scene, {}, parameters, &error)) << error.what;
   std::vector<bool> free;
-  for (const FitParameter& parameter : parameters) free.push_back(IsOfInitialState(parameter));
+  for (const FitParameter& parameter : parameters)
+    free.push_back(IsOfInitialState(scene, parameter));
   EXPECT_EQ(free, (std::vector<bool>{true, true, true, true, false}));
   const Eigen::VectorXd p =
       ParametersFromObservations(RolloutResiduals(parameterized, observations, channels), free);
@@ -139,6 +140,27 @@ TEST(ObservedStateTest, JointAnglesAndRatesFromAngles) {
   EXPECT_NEAR(p[2], -0.4, 1e-3);
   EXPECT_NEAR(p[3], -2.0, 0.1);
   EXPECT_EQ(p[4], 1.5);
+}
+
+// A cart on a rail: its place and speed are the joint's. Where it is drawn is where its anchor is, of
+// a free body the start.
+TEST(ObservedStateTest, ACartsDisplacementIsOfItsStart) {
+  const Scene scene = MakeScene(R"({"bodies": [
+      {"name": "cart", "mass": 1, "inertia": 1, "position": [0, 0]},
+      {"name": "free", "mass": 1, "inertia": 1, "position": [0, 1]}],
+    "joints": [{"name": "rail", "type": "prismatic", "bodies": ["cart", "world"],
+                "anchor": [0, 0], "axis": [1, 0]}],
+    "simulation": {"dt": 0.01, "duration": 0.1}})");
+  const auto is_start = [&](const std::string& path) {
+    return IsOfInitialState(scene, Parameter(path, 0.0));
+  };
+  EXPECT_TRUE(is_start("joints/rail/displacement"));
+  EXPECT_TRUE(is_start("joints/rail/rate"));
+  EXPECT_TRUE(is_start("bodies/free/position/x"));
+  EXPECT_TRUE(is_start("bodies/cart/velocity/x"));
+  EXPECT_FALSE(is_start("bodies/cart/position/x"));
+  EXPECT_FALSE(is_start("bodies/*/position/x"));
+  EXPECT_FALSE(is_start("joints/rail/damping"));
 }
 
 // A ball that rests on the floor is seen 2 mm in it, and 3 mm beside where the file has it.

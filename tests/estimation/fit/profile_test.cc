@@ -119,6 +119,30 @@ TEST(ProfileTest, AnIntervalThatMeetsABoundEndsThere) {
   EXPECT_GT(*bound.intervals[0].high, 0.1);
 }
 
+// The slope, 0.03, is at its bound 0 in a fifth of all draws. With it held there the other's interval
+// would be that of a mean, which is 0.29 off.
+TEST(ProfileTest, IntervalsBesideAParameterAtItsBoundContainTheTruth) {
+  int at_bound = 0, held = 0;
+  for (unsigned seed = 1; seed <= 200; ++seed) {
+    LineProblem problem(20);
+    problem.mutable_entries()[1].lower = 0.0;
+    std::mt19937 random(seed);
+    std::normal_distribution<double> normal(0.0, 1.0);
+    for (Eigen::Index t = 0; t < 20; ++t) {
+      problem.observed[t] = 0.03 * static_cast<double>(t) + normal(random);
+    }
+    const FitResult fit = Fit(FitOptions(), &problem, {});
+    ASSERT_EQ(fit.status, FitStatus::kConverged) << fit.message;
+    if (fit.estimate[1] > 0.0) continue;
+    ++at_bound;
+    EXPECT_EQ(fit.intervals[0].method, "profile") << seed;
+    ASSERT_TRUE(fit.intervals[0].low && fit.intervals[0].high) << seed;
+    held += *fit.intervals[0].low <= 0.0 && *fit.intervals[0].high >= 0.0 ? 1 : 0;
+  }
+  EXPECT_GE(at_bound, 25);
+  EXPECT_GE(held, (9 * at_bound) / 10) << at_bound;
+}
+
 TEST(ProfileTest, TheProblemWithOneHeldIsTheSameOnARidge) {
   DecayProblem problem(3, 5);
   const Eigen::VectorXd p = InitialOf(problem.entries());

@@ -234,10 +234,10 @@ TEST_F(FitJsonTest, MistakesInRecordingsNameTheRecordingOnlyWhereItHasThem) {
   EXPECT_EQ(
       message({{"initial", "from_observations"}, {"parameters", {"bodies/ball/velocity/x"}}}, none),
       "/initial: expected parameters that set nothing but initial poses, twists, joint "
-      "angles or rates, each per recording, got none");
+      "angles, displacements or rates, each per recording, got none");
   EXPECT_EQ(message(none, {{"initial", "from_observations"}}),
             "/recordings/1/initial: expected parameters that set nothing but initial poses, "
-            "twists, joint angles or rates, each per recording, got none");
+            "twists, joint angles, displacements or rates, each per recording, got none");
   const auto spread = [&](const Json& value) {
     return message({{"parameters",
                      {{{"path", "gravity/y"},

@@ -182,15 +182,20 @@ TEST(CertifyEventsTest, AFlatLandingIsADiscontinuity) {
   EXPECT_NE(c.verdict.find("box touch at once"), std::string::npos) << c.verdict;
 }
 
+// Also on a table, whose friction holds the balls at rest without a force between them.
 TEST(CertifyEventsTest, ATouchingCradleIsADiscontinuity) {
-  const Certificate c = CertificateOf(R"("gravity": [0, 0], "bodies": [
-      {"name": "a", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [-0.5, 0],
-       "velocity": [1, 0], "restitution": 1},
-      {"name": "b", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0, 0], "restitution": 1},
-      {"name": "c", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0.2, 0],
-       "restitution": 1}])",
-                                      1.0);
-  EXPECT_EQ(c.verdict.find("discontinuous: "), 0u) << c.verdict;
+  for (const char* support : {"", R"(, "support": {"friction": 0.1})"}) {
+    const auto ball = [&](const char* name, const char* place) {
+      return std::string(R"({"name": ")") + name + R"(", "shape": {"circle": {"radius": 0.1}},
+          "mass": 1, "restitution": 1, "position": )" +
+             place + support + "}";
+    };
+    const Certificate c = CertificateOf(
+        R"("gravity": [0, 0], "bodies": [)" + ball("a", R"([-0.5, 0], "velocity": [1, 0])") + ", " +
+            ball("b", "[0, 0]") + ", " + ball("c", "[0.2, 0]") + "]",
+        1.0);
+    EXPECT_EQ(c.verdict.find("discontinuous: "), 0u) << c.verdict;
+  }
 }
 
 TEST(CertifyEventsTest, AnApproachAtTheThresholdIsADiscontinuity) {

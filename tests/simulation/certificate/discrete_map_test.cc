@@ -269,5 +269,52 @@ TEST(DiscreteMapTest, TheMapsDerivativeThroughABounceHasTheOtherSign) {
   }
 }
 
+Certificate OfTheStart(const std::string& text) {
+  const Scene scene = SceneOf(text);
+  Model<double> model;
+  State<double> initial;
+  BuildModel(scene, &model, &initial);
+  ParameterPath start;
+  std::string error;
+  EXPECT_TRUE(ResolveParameter(scene, "forces/f/start", &start, &error)) << error;
+  return CertifyDerivative(
+      model, initial, RowMatrixXd(VariableJacobian(scene, model.structure, {DirectionOf(start)})),
+      {"forces/f/start"});
+}
+
+// A box at rest with friction under it, on a floor, a table or a rail, is pushed from 0.103 s on: the
+// motion's derivative of its speed by that time is −(F − friction) / m, that of the map −F / m or 0.
+TEST(DiscreteMapTest, APushThatStartsWithinAStepAsFrictionLetsGo) {
+  const auto box = [](double start, const std::string& body, const std::string& rest) {
+    return R"({"gravity": [0, -10], "bodies": [{"name": "b", "mass": 1, "friction": 0.5,
+        "shape": {"box": {"size": [0.4, 0.2]}}, "position": [0, 0.1])" +
+           body + R"(}], "forces": [{"name": "f", "body": "b", "force": [8, 0], "start": )" +
+           Exact(start) + R"(}], "simulation": {"dt": 0.01, "duration": 0.2})" + rest + "}";
+  };
+  const std::string floor = R"(}, {"name": "floor", "static": true, "friction": 0.5,
+      "shape": {"half_plane": {"normal": [0, 1], "offset": 0}})";
+  const std::string table = R"(, "support": {"friction": 0.5})";
+  const std::string rail = R"(, "joints": [{"name": "r", "type": "prismatic", "axis": [1, 0],
+      "bodies": ["b", "world"], "anchor": [0, 0.1], "friction": 5}])";
+  for (const double start : {0.103, 0.107}) {
+    for (const std::string& text : {box(start, floor, ""), box(start, "", rail)}) {
+      const Certificate c = OfTheStart(text);
+      EXPECT_EQ(c.verdict.rfind("of the discrete map: ", 0), 0u) << c.verdict << text;
+      EXPECT_NE(c.discrete_map.find("start of force f, as friction lets go"), std::string::npos)
+          << c.discrete_map;
+    }
+    // With 4 N it stays; on ice there is no friction that lets go.
+    std::string held = box(start, floor, "");
+    held.replace(held.find("[8, 0]"), 6, "[4, 0]");
+    EXPECT_EQ(OfTheStart(held).discrete_map, "");
+  }
+  std::string seen_from_above = box(0.103, table, "");
+  seen_from_above.replace(seen_from_above.find("[0, -10]"), 8, "[0, 0]");
+  EXPECT_NE(OfTheStart(seen_from_above).discrete_map.find("start of force f"), std::string::npos);
+  std::string without = box(0.103, "", rail);
+  without.replace(without.find("\"friction\": 5}"), 14, "\"friction\": 0}");
+  EXPECT_EQ(OfTheStart(without).discrete_map, "");
+}
+
 }  // namespace
 }  // namespace tangible

@@ -302,6 +302,50 @@ TEST(SupportsByEventsTest, ARodTurnsAboutAFootThatRests) {
   ExpectOthersAgree(scene, paths, result);
 }
 
+// A spring whose end is driven away at 1 m/s pulls a block that its support and something else hold
+// together: neither's share is determined, and both let go as the force reaches the sum of their
+// limits, t0 = L / k; from there x = s − sin(ω s) / ω with s = t − t0, ω² = k / m.
+TEST(SupportsByEventsTest, WhatHoldsTogetherLetsGoAtTheInstant) {
+  const std::string hand = R"(, {"name": "hand", "kinematic": true, "position": [1, 0],
+      "velocity": [1, 0]})";
+  const std::string spring = R"(], "springs": [{"name": "s", "bodies": ["b", "hand"],
+      "anchors": [[0, 0], [1, 0]], "stiffness": 4, "rest_length": 1})";
+  const std::string other = R"(, {"name": "c", "mass": 2, "inertia": 1, "position": [0, 0.5],
+      "support": {"friction": 0.1, "load": 10}})";
+  struct Case {
+    std::string beside, path;
+    double mass;
+  };
+  const std::vector<Case> cases = {
+      {hand + R"(], "joints": [{"name": "rail", "type": "prismatic", "bodies": ["b", "world"],
+          "anchor": [0, 0], "axis": [1, 0], "friction": 1})" +
+           spring,
+       "joints/rail/friction", 2.0},
+      {hand + other + R"(], "joints": [{"type": "weld", "name": "w", "bodies": ["b", "c"],
+          "anchor": [0, 0.2]}, {"name": "rail", "type": "prismatic", "bodies": ["b", "world"],
+          "anchor": [0, 0], "axis": [1, 0]})" +
+           spring,
+       "bodies/c/support/load", 4.0},
+      {hand + R"(, {"name": "wall", "static": true, "friction": 1, "shape": {"half_plane":
+          {"normal": [0, 1], "offset": -0.1}}}], "forces": [{"name": "down", "body": "b",
+          "force": [0, -1]})" +
+           spring,
+       "bodies/wall/friction", 2.0}};
+  for (const Case& one : cases) {
+    for (const double dt : {0.25, 0.1, 0.03, 0.01}) {
+      const Scene scene = TableByEvents(
+          R"("shape": {"box": {"size": [0.6, 0.2]}}, "position": [0, 0], "friction": 1,
+             "support": {"friction": 0.1, "load": 10})",
+          dt, 1.0, "0, 0", one.beside);
+      const double omega = std::sqrt(4.0 / one.mass);
+      const std::vector<std::string> paths = {one.path, "springs/s/stiffness"};
+      const GradientResult result = Jacobian(scene, paths, GradientMethod::kAdjoint);
+      EXPECT_NEAR(result.values[0], 0.5 - std::sin(0.5 * omega) / omega, 1e-8) << one.path << dt;
+      ExpectOthersAgree(scene, paths, result);
+    }
+  }
+}
+
 // A block on three feet that another one pushes off its centre, with friction between them.
 TEST(SupportsByEventsTest, BlocksThatPushEachOther) {
   const std::string block = R"("shape": {"box": {"size": [0.4, 0.3]}}, "position": [0, 0],
