@@ -56,8 +56,8 @@ Eigen::VectorXd ParametersFromObservations(const RolloutResiduals& residuals,
                                            const std::vector<bool>& free);
 
 /// Whether a parameter sets nothing but initial poses and twists of bodies, and angles,
-/// displacements and rates of joints. The position of a body that a hinge, slider, weld or rod holds
-/// is a length: it moves the anchor on the body.
+/// displacements and rates of joints. The position of a body that a hinge, slider, weld or rod
+/// holds is a length: it moves the anchor on the body.
 bool IsOfInitialState(const Scene& scene, const FitParameter& parameter);
 
 }  // namespace tangible

@@ -365,8 +365,7 @@ std::vector<std::pair<int, std::string>> NeedProfiles(const FitOptions& options,
                     [](const ConfidenceInterval& interval) { return !interval; });
   bool one_at_bound = false;
   for (int k = 0; k < problem->num_shared() && few; ++k) {
-    one_at_bound =
-        one_at_bound || IsAtBound(entries[static_cast<size_t>(k)], result.estimate[k]);
+    one_at_bound = one_at_bound || IsAtBound(entries[static_cast<size_t>(k)], result.estimate[k]);
   }
   for (int k = 0; k < static_cast<int>(entries.size()); ++k) {
     const ParameterEntry& entry = entries[static_cast<size_t>(k)];

@@ -124,8 +124,8 @@ TEST(Ilqr, OfALinearQuadraticProblemIsRiccatis) {
   }
 }
 
-// A cart is driven to its target by a force of little cost: the gradient's rounding, in proportion to
-// the weight of the end, stays above its tolerance where no step decreases the cost any more.
+// A cart is driven to its target by a force of little cost: the gradient's rounding, in proportion
+// to the weight of the end, stays above its tolerance where no step decreases the cost any more.
 TEST(Ilqr, ConvergesWhereOnlyRoundingIsLeft) {
   const double h = 0.05, mass = 2.0;
   MatrixX<double> a(2, 2), b(2, 1);

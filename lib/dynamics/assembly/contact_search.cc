@@ -197,14 +197,12 @@ ContactsAhead ContactSearch::FindPassed(const Model<double>& model, const State<
 // Whether a corner passes another one by before it comes down to the face that ends there.
 bool ContactSearch::PassesCorner(const Model<double>& model, const State<double>& state,
                                  const ActiveContact& contact, double approach, double h) const {
-  for (const int body : {contact.a, contact.b}) {
-    const ShapeType shape = model.structure->bodies[body].shape;
-    if (shape == ShapeType::kCircle || shape == ShapeType::kHalfPlane) return false;
-  }
+  if (!HaveCorners(*model.structure, contact)) return false;
   const double rounding = lengths_.Rounding(state, contact.a, contact.b);
   const double slow = kNoApproach * (bound_[contact.a] + bound_[contact.b]) + rounding / h;
   const double size = std::min(lengths_.radius(contact.a), lengths_.radius(contact.b));
-  return approach < -slow && contact.gap > lengths_.Touch(state, contact.a, contact.b) &&
+  return approach < -slow && contact.gap + h * approach < 0.0 &&
+         contact.gap >= -lengths_.Touch(state, contact.a, contact.b) &&
          PassesBy(model, state, contact, approach, size, slow);
 }
 
@@ -325,6 +323,55 @@ void ContactSearch::FindContacts(const Model<double>& model, const State<double>
       }
       if (PassesCorner(model, state, contact, approach, h)) continue;
     }
+    // A pusher that arrives as the step ends would move a body on its support by rounding, in a
+    // direction that friction cannot have.
+    const double touch = lengths_.Touch(state, a, b);
+    if (!model.structure->supports.empty() && gap > kArrives * touch &&
+        std::abs(gap + h * approach) <= touch) {
+      continue;
+    }
+    if (Rebounds(model, state, h, contact, rows)) contact.law = ContactLaw::kRestitution;
+    contacts->push_back(contact);
+  }
+  if (count < 2 && model.seams != nullptr && HaveCorners(*model.structure, contact)) {
+    AddReached(model, state, h, scratch, contact, parts, {features, features + count}, contacts);
+  }
+}
+
+// A corner that slides along one face towards another one, which meets it in a concave corner, is
+// over that face only when it has come through: the contacts of where bodies would be as the step
+// ends. Now it is on the free side of both.
+void ContactSearch::AddReached(const Model<double>& model, const State<double>& state, double h,
+                               const AssemblyScratch<double>& scratch, ActiveContact contact,
+                               PartPair parts, std::span<const ContactFeature> listed,
+                               std::vector<ActiveContact>* contacts) const {
+  const int a = contact.a, b = contact.b;
+  const auto may_hide = [&](int body, int part) {
+    return model.OutlineOf(body, part) != nullptr || model.HasSeams(body, part);
+  };
+  if (!may_hide(a, parts.a) && !may_hide(b, parts.b)) return;
+  const double touch = lengths_.Touch(state, a, b);
+  const double way = h * (SpeedOf(&state.twist[3 * a], lengths_.radius(a)) +
+                          SpeedOf(&state.twist[3 * b], lengths_.radius(b)));
+  if (way <= touch) return;
+  ContactFeature features[2];
+  const int count = FindFeatures(model, a, PoseAfter(state, a, h), b, PoseAfter(state, b, h), parts,
+                                 0.0, features);
+  for (int k = 0; k < count; ++k) {
+    contact.feature = features[k];
+    const bool is_listed =
+        std::any_of(listed.begin(), listed.end(), [&](const ContactFeature& feature) {
+          ActiveContact other = contact;
+          other.feature = feature;
+          return other.SameAs(contact);
+        });
+    if (is_listed) continue;
+    ContactRows<double> rows;
+    EvaluateContactRows(model, scratch.poses, contact, &rows);
+    contact.gap = rows.geometry.gap;
+    const double approach = RelativeSpeed(state, a, rows.normal_a, b, rows.normal_b);
+    if (!(contact.gap >= -touch && contact.gap + h * approach < 0.0)) continue;
+    contact.law = GapLaw(contact.gap, h, model.structure->settings);
     if (Rebounds(model, state, h, contact, rows)) contact.law = ContactLaw::kRestitution;
     contacts->push_back(contact);
   }

@@ -9,6 +9,7 @@
 // the step without contacts; after the solve CheckBounds says whether a body is faster than its
 // bound, and if so the search is repeated.
 
+#include <span>
 #include <vector>
 
 #include "tangible/dynamics/assembly/assembly.h"
@@ -49,6 +50,10 @@ class ContactSearch {
                              std::vector<ActiveContact>* contacts);
 
  private:
+  void AddReached(const Model<double>& model, const State<double>& state, double h,
+                  const AssemblyScratch<double>& scratch, ActiveContact contact, PartPair parts,
+                  std::span<const ContactFeature> listed,
+                  std::vector<ActiveContact>* contacts) const;
   bool PassesCorner(const Model<double>& model, const State<double>& state,
                     const ActiveContact& contact, double approach, double h) const;
   ContactsAhead FindPassed(const Model<double>& model, const State<double>& state,

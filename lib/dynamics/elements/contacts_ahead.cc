@@ -6,18 +6,16 @@
 #include <limits>
 
 #include "tangible/dynamics/model/tolerances.h"
+#include "tangible/geometry/tolerances.h"
 
 namespace tangible {
-namespace {
 
-Pose<double> Moved(const State<double>& state, int body, double time) {
+Pose<double> PoseAfter(const State<double>& state, int body, double time) {
   const double* pose = &state.pose[3 * body];
   const double* twist = &state.twist[3 * body];
   return Pose<double>(Vector2<double>(pose[0] + time * twist[0], pose[1] + time * twist[1]),
                       pose[2] + time * twist[2]);
 }
-
-}  // namespace
 
 ContactsAhead FindContactsAhead(const Model<double>& model, const State<double>& state,
                                 const ActiveContact& contact, double approach, double size,
@@ -28,8 +26,8 @@ ContactsAhead FindContactsAhead(const Model<double>& model, const State<double>&
   const int b = contact.b;
   ContactFeature features[2];
   const int count =
-      FindFeatures(model, a, Moved(state, a, time), b, Moved(state, b, time), contact.Parts(),
-                   std::numeric_limits<double>::infinity(), features);
+      FindFeatures(model, a, PoseAfter(state, a, time), b, PoseAfter(state, b, time),
+                   contact.Parts(), std::numeric_limits<double>::infinity(), features);
   for (int k = 0; k < count; ++k) {
     ActiveContact& next = ahead.contacts[k];
     next = contact;
@@ -46,10 +44,26 @@ ContactsAhead FindContactsAhead(const Model<double>& model, const State<double>&
   return ahead;
 }
 
+bool HaveCorners(const ModelStructure& structure, const ActiveContact& contact) {
+  const auto has = [&](int body) {
+    const ShapeType shape = structure.bodies[body].shape;
+    return shape != ShapeType::kCircle && shape != ShapeType::kHalfPlane;
+  };
+  return has(contact.a) && has(contact.b);
+}
+
 bool PassesBy(const Model<double>& model, const State<double>& state, const ActiveContact& contact,
               double approach, double size, double slow) {
-  const double time = (contact.gap + kCorner * size) / -approach;
-  const Pose<double> pose_a = Moved(state, contact.a, time), pose_b = Moved(state, contact.b, time);
+  const double time = (std::max(contact.gap, 0.0) + kCorner * size) / -approach;
+  const double past = kCorner * size / -approach;
+  const auto speed = [&](int body) {
+    const double* twist = &state.twist[3 * body];
+    return std::hypot(twist[0], twist[1]) + size * std::abs(twist[2]);
+  };
+  // What comes down slowly is beside something else by then.
+  if (past * (speed(contact.a) + speed(contact.b)) > kBesideCorner * size) return false;
+  const Pose<double> pose_a = PoseAfter(state, contact.a, time);
+  const Pose<double> pose_b = PoseAfter(state, contact.b, time);
   ContactFeature features[2];
   const int count = FindFeatures(model, contact.a, pose_a, contact.b, pose_b, contact.Parts(),
                                  std::numeric_limits<double>::infinity(), features);
@@ -59,11 +73,14 @@ bool PassesBy(const Model<double>& model, const State<double>& state, const Acti
     if (next.SameAs(contact)) return false;
     ContactRows<double> rows;
     EvaluateContactRows(model, pose_a, pose_b, next, &rows);
-    if (RelativeSpeed(state, contact.a, rows.normal_a, contact.b, rows.normal_b) < -slow) {
+    // A step up of more than kFlushStep is a wall, however low.
+    if (rows.geometry.gap < -kFlushStep ||
+        RelativeSpeed(state, contact.a, rows.normal_a, contact.b, rows.normal_b) < -slow) {
       return false;
     }
   }
-  return count > 0;
+  // Behind the end of a run of an outline nothing of it is near.
+  return true;
 }
 
 }  // namespace tangible

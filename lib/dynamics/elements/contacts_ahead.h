@@ -27,10 +27,16 @@ ContactsAhead FindContactsAhead(const Model<double>& model, const State<double>&
                                 const ActiveContact& contact, double approach, double size,
                                 double tolerance, double slow);
 
-/// Whether a `contact` as above, with a gap > 0, does not close although its gap does: right after
-/// that other features are nearest, and the bodies approach along none of them by more than `slow`
-/// (m/s). The trailing corner of a box that tips over a table's edge comes down to the table's height
-/// as it passes the edge. Allocates nothing.
+/// The pose of a body after it has moved with its twist for a time, s.
+Pose<double> PoseAfter(const State<double>& state, int body, double time);
+
+/// Whether both bodies of a contact of shapes may have corners.
+bool HaveCorners(const ModelStructure& structure, const ActiveContact& contact);
+
+/// Whether a `contact` as above does not close although its gap does: right after that other
+/// features are nearest, and the bodies approach along none of them by more than `slow` (m/s). The
+/// trailing corner of a box that tips over a table's edge comes down to the table's height as it
+/// passes the edge. Allocates nothing.
 bool PassesBy(const Model<double>& model, const State<double>& state, const ActiveContact& contact,
               double approach, double size, double slow);
 

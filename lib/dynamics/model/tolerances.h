@@ -33,6 +33,11 @@ inline constexpr double kNoApproach = 1e-9;
 /// Of the size of the smaller body, or length of an edge: how far bodies move on after two corners
 /// have met: farther than the ends of faces that count as aligned, and less than any other length.
 inline constexpr double kCorner = 1e-6;
+/// Of the touching tolerance: a larger gap that closes just as a step ends closes in the next.
+inline constexpr double kArrives = 4.0;
+/// Of the same as kCorner: bodies that go farther while they close that much have not passed at a
+/// corner.
+inline constexpr double kBesideCorner = 0.01;
 /// Of the bound of a speed: a speed that exceeds its bound by less is rounding, and no search is
 /// repeated.
 inline constexpr double kSpeedBound = 1e-12;

@@ -481,6 +481,38 @@ double EventStepper::SlowSpeed(const Model<double>& model, const State<double>& 
   return slow;
 }
 
+namespace {
+
+// Whether a closed contact of the same bodies carries along nearly the same row what a contact that
+// leaves has carried, as where a ball rolls from one facet of a fine curve to the next: gravity
+// does not bring it back.
+bool IsCarried(const Impulses& impact, size_t leaves) {
+  const ContactProblem<double>& problem = impact.problem;
+  const auto product = [&](size_t i, size_t k) {
+    const ContactBlock<double>& x = problem.contacts[i];
+    const ContactBlock<double>& y = problem.contacts[k];
+    double sum = 0.0;
+    for (int j = 0; j < 3; ++j) {
+      if (x.a >= 0) sum += x.normal_a[j] * y.normal_a[j] / problem.mass[3 * x.a + j];
+      if (x.b >= 0) sum += x.normal_b[j] * y.normal_b[j] / problem.mass[3 * x.b + j];
+    }
+    return sum;
+  };
+  const ActiveContact& contact = impact.contacts[leaves];
+  for (size_t k = 0; k < impact.contacts.size(); ++k) {
+    if (k == leaves || impact.contacts[k].IsPureFriction() ||
+        impact.solution.modes[k] == ContactMode::kOpen ||
+        !impact.contacts[k].IsBetweenTheSame(contact)) {
+      continue;
+    }
+    const double own = product(leaves, leaves), other = product(k, k);
+    if (product(leaves, k) >= (1.0 - kCarried) * std::sqrt(own * other)) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
 // After an impact: where a contact that had been at rest leaves so slowly that gravity would bring
 // it back before it has left the touching tolerance (or, after max_events_per_step, more slowly
 // than the restitution threshold), it stays closed: all touching contacts there are held, along
@@ -520,7 +552,7 @@ bool EventStepper::Settle(const Model<double>& model, const Impulses& impact, St
                   IsInelastic(model, contact) ? settings.restitution_threshold : 0.0});
     all_slow = all_slow && speed(impact.before) >= -returns;
     if (mode == ContactMode::kOpen || opened) {
-      if (speed(*state) > returns) {
+      if (speed(*state) > returns || (!Rattles(model, contact) && IsCarried(impact, i))) {
         continue;
       }
       any = any || (speed(*state) > slow && speed(impact.before) >= -slow);

@@ -126,7 +126,15 @@ void EventStepper::FindTouching(const Model<double>& model, const State<double>&
       ahead = FindContactsAhead(model, state, contact, approach, size, touch, slow);
     }
     if (ahead.count == 0) {
+      const size_t first = touching_.contacts.size();
       AddTouching(model, state, contact);
+      // What passes by at this instant touches, and opens.
+      const bool passes = approach < -slow && size > 0.0 && HaveCorners(structure, contact) &&
+                          PassesBy(model, state, contact, approach, size, slow);
+      if (passes) {
+        std::fill(touching_.approach.begin() + static_cast<std::ptrdiff_t>(first),
+                  touching_.approach.end(), HUGE_VAL);
+      }
     }
     for (int k = 0; k < ahead.count; ++k) {
       AddTouching(model, state, ahead.contacts[k]);

@@ -64,28 +64,60 @@ double EventStepper::HeldSpeed(const Model<double>& model) {
 // Balls that just fit between two walls push each other nearly along the line in which they lie, by
 // rows that depend on each other to rounding: no impulses are found to the tolerance, and many
 // exist, because friction holds bodies between faces that are nearly parallel whatever the
-// impulses along the normals are.
+// impulses along the normals are. What approaches is held, and what that would press together too:
+// a ball that rolls from one facet of a fine curve to the next leaves the one behind. What slides
+// faster than this slides on.
 bool EventStepper::HoldsSlow(const Model<double>& model, Impulses* impact, State<double>* state,
                              StepReport* outcome) {
   const double slow = HeldSpeed(model);
-  Segment held;
-  held.time = impact->time;
-  held.middle = inside_;
-  held.starts = true;
-  held.contacts = impact->contacts;
-  held.friction = impact->friction;
-  for (size_t i = 0; i < impact->contacts.size(); ++i) {
-    const ActiveContact& contact = impact->contacts[i];
-    const ContactBlock<double>& block = impact->problem.contacts[i];
-    if (RelativeSpeed(*state, contact.a, block.normal_a, contact.b, block.normal_b) < -slow) {
-      return false;
-    }
-    held.modes.push_back(block.has_friction ? ContactMode::kSticking : ContactMode::kClosed);
+  const double still = SlowSpeed(model, *state);
+  const std::vector<ActiveContact> contacts = impact->contacts;
+  const std::vector<CoefficientSource> friction = impact->friction;
+  const std::vector<ContactBlock<double>> blocks = impact->problem.contacts;
+  const auto speed = [&](const State<double>& at, size_t i) {
+    return RelativeSpeed(at, contacts[i].a, blocks[i].normal_a, contacts[i].b, blocks[i].normal_b);
+  };
+  std::vector<char> holds(contacts.size(), 0);
+  bool any = false;
+  for (size_t i = 0; i < contacts.size(); ++i) {
+    if (speed(*state, i) < -slow) return false;
+    holds[i] = speed(*state, i) < -still ? 1 : 0;
+    any = any || holds[i] != 0;
   }
-  SetUpProjection(held, *state, impact);
-  if (!flow_.Project(model, impact)) return false;
+  if (!any) holds.assign(contacts.size(), 1);
+  State<double> after = *state;
+  for (bool more = true; more;) {
+    Segment held;
+    held.time = impact->time;
+    held.middle = inside_;
+    held.starts = true;
+    for (size_t i = 0; i < contacts.size(); ++i) {
+      const double slip = RelativeSpeed(*state, contacts[i].a, blocks[i].tangent_a, contacts[i].b,
+                                        blocks[i].tangent_b);
+      const bool sticks = blocks[i].has_friction && std::abs(slip) <= slow;
+      if (holds[i] == 0 || (contacts[i].IsPureFriction() && !sticks)) continue;
+      held.contacts.push_back(contacts[i]);
+      held.friction.push_back(friction[i]);
+      held.modes.push_back(sticks ? ContactMode::kSticking : ContactMode::kClosed);
+    }
+    SetUpProjection(held, *state, impact);
+    more = false;
+    if (!flow_.Project(model, impact)) {
+      if (std::all_of(holds.begin(), holds.end(), [](char one) { return one != 0; })) return false;
+      holds.assign(contacts.size(), 1);
+      more = true;
+      continue;
+    }
+    after.twist = state->twist;
+    SpreadTwists(*model.structure, impact->solution.motion, &after.twist);
+    for (size_t i = 0; i < contacts.size(); ++i) {
+      if (holds[i] != 0 || !(speed(after, i) < -still)) continue;
+      holds[i] = 1;
+      more = true;
+    }
+  }
   ++outcome->given_up.held_contacts;
-  SpreadTwists(*model.structure, impact->solution.motion, &state->twist);
+  state->twist = after.twist;
   impact->new_twist = state->twist;
   return true;
 }

@@ -248,6 +248,8 @@ inline constexpr double kSupportGridSlack = 1e-3;
 /// The norm of the difference of two unit vectors: the direction in which a point of a support
 /// starts is found to it.
 inline constexpr double kSupportDirection = 1e-13;
+/// Of the lengths of two rows: with a product that falls short of them by less they are one.
+inline constexpr double kCarried = 1e-3;
 /// Of a motion: the instant at which supports that share a load let it go is located to it.
 inline constexpr double kShareEnds = 1e-11;
 /// Of the wrench that a support balances: its limit is located to it.

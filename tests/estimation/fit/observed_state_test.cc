@@ -142,8 +142,8 @@ TEST(ObservedStateTest, JointAnglesAndRatesFromAngles) {
   EXPECT_EQ(p[4], 1.5);
 }
 
-// A cart on a rail: its place and speed are the joint's. Where it is drawn is where its anchor is, of
-// a free body the start.
+// A cart on a rail: its place and speed are the joint's. Where it is drawn is where its anchor is,
+// of a free body the start.
 TEST(ObservedStateTest, ACartsDisplacementIsOfItsStart) {
   const Scene scene = MakeScene(R"({"bodies": [
       {"name": "cart", "mass": 1, "inertia": 1, "position": [0, 0]},

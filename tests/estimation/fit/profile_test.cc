@@ -119,8 +119,8 @@ TEST(ProfileTest, AnIntervalThatMeetsABoundEndsThere) {
   EXPECT_GT(*bound.intervals[0].high, 0.1);
 }
 
-// The slope, 0.03, is at its bound 0 in a fifth of all draws. With it held there the other's interval
-// would be that of a mean, which is 0.29 off.
+// The slope, 0.03, is at its bound 0 in a fifth of all draws. With it held there the other's
+// interval would be that of a mean, which is 0.29 off.
 TEST(ProfileTest, IntervalsBesideAParameterAtItsBoundContainTheTruth) {
   int at_bound = 0, held = 0;
   for (unsigned seed = 1; seed <= 200; ++seed) {

@@ -282,8 +282,9 @@ Certificate OfTheStart(const std::string& text) {
       {"forces/f/start"});
 }
 
-// A box at rest with friction under it, on a floor, a table or a rail, is pushed from 0.103 s on: the
-// motion's derivative of its speed by that time is −(F − friction) / m, that of the map −F / m or 0.
+// A box at rest with friction under it, on a floor, a table or a rail, is pushed from 0.103 s on:
+// the motion's derivative of its speed by that time is −(F − friction) / m, that of the map −F / m
+// or 0.
 TEST(DiscreteMapTest, APushThatStartsWithinAStepAsFrictionLetsGo) {
   const auto box = [](double start, const std::string& body, const std::string& rest) {
     return R"({"gravity": [0, -10], "bodies": [{"name": "b", "mass": 1, "friction": 0.5,

@@ -273,5 +273,28 @@ TEST(SupportsTest, AcrossAStraightMotionFrictionIsThatOfTheNewSpeed) {
   }
 }
 
+// A pusher reaches a block that rests on two points exactly as a step ends: it does not move in
+// that step, not even by rounding, and is taken along in the next.
+TEST(SupportsTest, APusherArrivesAsAStepEnds) {
+  for (const double dt : {0.005, 0.002, 0.001}) {
+    for (const char* y : {"0", "0.04", "0.06"}) {
+      const Scene scene = Table(
+          R"("shape": {"box": {"size": [0.3, 0.2]}}, "position": [0, 0], "friction": 0.2,
+             "support": {"friction": 0.2, "points": [[0.1, 0], [-0.1, 0]]})",
+          dt, 0.3, "0, 0",
+          R"(, {"name": "p", "kinematic": true, "friction": 0.2,
+          "shape": {"circle": {"radius": 0.05}}, "velocity": [0.5, 0], "position": [-0.3, )" +
+              std::string(y) + "]}");
+      Model<double> model;
+      State<double> state, final;
+      BuildModel(scene, &model, &state);
+      const RolloutReport report = Rollout(model, state, nullptr, &final);
+      EXPECT_EQ(report.status, StepStatus::kDone) << dt << " " << y << ": " << report.message;
+      EXPECT_GT(final.pose[0], 0.02) << dt << " " << y;
+      EXPECT_LT(final.pose[0], 0.0501) << dt << " " << y;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace tangible
