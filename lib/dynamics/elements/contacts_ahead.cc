@@ -47,7 +47,8 @@ ContactsAhead FindContactsAhead(const Model<double>& model, const State<double>&
 bool HaveCorners(const ModelStructure& structure, const ActiveContact& contact) {
   const auto has = [&](int body) {
     const ShapeType shape = structure.bodies[body].shape;
-    return shape != ShapeType::kCircle && shape != ShapeType::kHalfPlane;
+    return shape != ShapeType::kCircle && shape != ShapeType::kHalfPlane &&
+           shape != ShapeType::kSpline;
   };
   return has(contact.a) && has(contact.b);
 }
