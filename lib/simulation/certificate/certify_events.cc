@@ -362,6 +362,22 @@ void RolloutCertifier::AddStoppedDead(const Model<double>& model, long step,
   }
 }
 
+namespace {
+
+// Of bodies that rest on their supports without a load, forces are rounding beside what these could
+// hold.
+double RoundingOfHeld(const Model<double>& model) {
+  double rounding = 0.0;
+  for (const SupportIndex& support : model.structure->supports) {
+    const double* x = &model.parameters[support.numbers];
+    rounding =
+        std::max(rounding, kForceTolerance * x[SupportIndex::kFriction] * x[SupportIndex::kLoad]);
+  }
+  return rounding;
+}
+
+}  // namespace
+
 void RolloutCertifier::AddSegment(const Model<double>& model, long step,
                                   EventDerivative* derivative, Segment* segment) {
   const ModelStructure& s = *model.structure;
@@ -376,14 +392,7 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
       largest = std::max(largest, share.normal_impulse[i]);
     }
   }
-  // Of bodies that rest on their supports without a load, forces are rounding beside what these
-  // could hold.
-  double rounding = 0.0;
-  for (const SupportIndex& support : s.supports) {
-    const double* x = &model.parameters[support.numbers];
-    rounding =
-        std::max(rounding, kForceTolerance * x[SupportIndex::kFriction] * x[SupportIndex::kLoad]);
-  }
+  const double rounding = RoundingOfHeld(model);
   // The motion that follows an instant starts with the same forces, and knows which contacts at
   // their limit it releases.
   const bool motion_follows = segment->length == 0.0 && segment->event == EventKind::kStepEnd;

@@ -112,6 +112,15 @@ double EventSearch::SpeedTolerance(const Model<double>& model, const State<doubl
   return std::max(kSlowShare * speed, kLoadShare * load_speed_) + rounding + kLeastSpeed;
 }
 
+namespace {
+
+bool HasHeld(const std::vector<SupportState>& supports) {
+  return std::any_of(supports.begin(), supports.end(),
+                     [](const SupportState& at) { return at.holds != SupportState::kNothing; });
+}
+
+}  // namespace
+
 void EventSearch::FindContacts(const Model<double>& model, const State<double>& state, double reach,
                                std::vector<ActiveContact>* contacts) {
   const ModelStructure& structure = *model.structure;
@@ -429,23 +438,19 @@ bool EventSearch::IsShared(const Model<double>& model, const Event& trial) {
          !IsDetermined(trial, &At(model, segment_->length)->motion.stages[0]);
 }
 
-// Whether bodies at rest on their supports share the force of an event with these: whether all of
-// them hold is decided after the motion.
-bool EventSearch::IsSharedWithSupports(const Model<double>& model, const Event& trial) {
-  if (!has_held_ || trial.kind == EventKind::kSlipEnds ||
-      IsDetermined(trial, &At(model, segment_->length)->motion.stages[0])) {
-    return false;
+// Takes the event of a closed contact, unless bodies at rest on their supports share its force with
+// these: whether all of them hold is decided after the motion.
+void EventSearch::TakeClosed(const Model<double>& model, const Event& trial, Event* event) {
+  if (has_held_ && trial.kind != EventKind::kSlipEnds &&
+      !IsDetermined(trial, &At(model, segment_->length)->motion.stages[0])) {
+    lets_go_with_others_ = true;
+  } else {
+    *event = trial;
   }
-  lets_go_with_others_ = true;
-  return true;
 }
 
 void EventSearch::SearchClosed(const Model<double>& model, Event* event) {
   if (segment_->contacts.empty()) return;
-  const std::vector<SupportState>& supports = segment_->before.supports;
-  has_held_ = std::any_of(supports.begin(), supports.end(), [](const SupportState& at) {
-    return at.holds != SupportState::kNothing;
-  });
   // Of few contacts a search in their order costs little.
   const size_t first = segment_->contacts.size() < kManyContacts ? 0 : FirstToEnd(model, *event);
   for (size_t k = 0; k < segment_->contacts.size() && !event->at_start; ++k) {
@@ -464,11 +469,10 @@ void EventSearch::SearchClosed(const Model<double>& model, Event* event) {
       }
       const auto f = [&](Sample& sample) { return ModeValue(model, &sample, trial); };
       const auto ends_between = [&](double a, double fa, double b, double fb) {
-        if (IsSharedWithSupports(model, trial)) return;
         trial.length = Refine(model, f, std::max(kLocatedOfSize * at_start, located), a, fa, b, fb);
         trial.at_once =
             trial.length < kShortestPart * b && f(*At(model, trial.length)) < -tolerance;
-        *event = trial;
+        TakeClosed(model, trial, event);
       };
       double a = 0.0;
       double fa = at_start;
@@ -489,10 +493,9 @@ void EventSearch::SearchClosed(const Model<double>& model, Event* event) {
         }
         // At the end of the motion the function has reached 0 to rounding: the event is there. The
         // next motion could not find it, because its function would start at 0.
-        if (share == 1.0 && fb <= tolerance && event->kind != trial.kind &&
-            !IsSharedWithSupports(model, trial)) {
+        if (share == 1.0 && fb <= tolerance && event->kind != trial.kind) {
           trial.length = b;
-          *event = trial;
+          TakeClosed(model, trial, event);
           return;
         }
         a = b;
@@ -625,6 +628,7 @@ bool EventSearch::Run(const Model<double>& model, const std::vector<ActiveContac
   has_start_ = false;
   all_good_ = true;
   lets_go_with_others_ = false;
+  has_held_ = HasHeld(segment->before.supports);
   const long most = kEvaluationsOfEvent * num_pairs_with_events_ *
                     (1L + model.structure->settings.max_events_per_step);
   if (evaluations_ > most) {

@@ -167,7 +167,7 @@ class EventSearch {
   /// Whether they differ after a motion of this length, and the rates at which contacts then go.
   bool Departs(const Model<double>& model, double length, std::vector<ReleaseRate>* rates);
   bool IsShared(const Model<double>& model, const Event& trial);
-  bool IsSharedWithSupports(const Model<double>& model, const Event& trial);
+  void TakeClosed(const Model<double>& model, const Event& trial, Event* event);
   static void SetEvent(const Event& event, Segment* segment);
   /// Whether loads change in a motion and rows share forces that are not determined.
   bool SharesChange(const Model<double>& model, double length);
