@@ -136,6 +136,12 @@ int ImportTable(const std::string& file, TableFormat format) {
   } else {
     std::printf("%zu rows, %ld coordinates missing\n", recording.rows.size(), recording.missing);
   }
+  if (recording.before_zero > 0) {
+    ReportError(file + ": " + std::to_string(recording.before_zero) +
+                (recording.before_zero == 1 ? " row has a time before 0 and is"
+                                            : " rows have times before 0 and are") +
+                " left out (--from begins earlier)");
+  }
   if (recording.start != 0.0) {
     const std::string start = CsvNumber(recording.start);
     std::printf("times count from %s s of the recording\n", start.c_str());

@@ -338,6 +338,7 @@ class RowCollector {
       }
       const bool wanted = layout_.name < 0 || !moment.name.empty();
       if (wanted && IsWithin(moment.time)) moments.push_back(moment);
+      if (wanted && !options_.from && moment.time < -Rounding(0.0)) ++recording_->before_zero;
     }
     const Moment* const start = FindStart(moments);
     for (const Moment& moment : moments) {
@@ -395,9 +396,20 @@ class RowCollector {
     if (from == 0.0 && layout_.time_offset == 0.0) return moment.time;
     // The numbers as they were written: 0.3 − 0.3 is 0, though 0.3 has more bits than a double.
     const ClockNumber before = ReadClock(CsvNumber(-layout_.time_offset), -layout_.time_offset);
+    const ClockNumber begin = ReadClock(CsvNumber(from), from);
+    const ClockNumber shift{begin.whole + before.whole, begin.part + before.part};
+    // Of a clock in ms a second is 1000 units, exactly; a thousandth is rounded.
+    const long double per_second = std::round(1.0L / scale_);
+    if (std::abs(per_second * scale_ - 1.0L) <= kUnitRounding) {
+      const long double units = per_second * shift.part;
+      const long double nearest = std::round(units);
+      const bool is_whole = std::abs(units - nearest) <= kUnitRounding * std::abs(units);
+      const ClockNumber shifted{moment.clock.whole - per_second * shift.whole,
+                                moment.clock.part - (is_whole ? nearest : units)};
+      return static_cast<double>((shifted.whole + shifted.part) / per_second);
+    }
     const ClockNumber scaled{scale_ * moment.clock.whole, scale_ * moment.clock.part};
-    const ClockNumber shifted{scaled.whole - before.whole, scaled.part - before.part};
-    return static_cast<double>(shifted.Since(ReadClock(CsvNumber(from), from)));
+    return static_cast<double>(scaled.Since(shift));
   }
 
   bool ReadTime(Moment* moment) {

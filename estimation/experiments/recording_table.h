@@ -79,7 +79,8 @@ struct TableRecording {
     double value;
   };
   std::vector<Noise> noise;
-  long missing = 0;  ///< cells that were empty or not likely enough
+  long before_zero = 0;  ///< rows that were left out, as their time is before 0
+  long missing = 0;      ///< cells that were empty or not likely enough
 };
 
 /// Reads a recording from text. On failure sets one line "file: line 3: what, expected, got": an

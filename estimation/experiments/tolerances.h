@@ -12,6 +12,9 @@ inline constexpr double kWindowRounding = 1e-9;
 /// Of an end of the window, beside kWindowRounding: the end and the scale of a table's times are
 /// rounded to doubles, by a quarter of this each.
 inline constexpr double kEndRounding = 4.5e-16;
+/// Of the number, as a long double: units of a table's times in a second, and the first time in
+/// them, that differ from a whole number by less are that number.
+inline constexpr double kUnitRounding = 1e-18;
 /// Absolute, s: a recording whose first time is later has the times of a clock that began
 /// elsewhere (in 1970, or when the computer was started), and they are counted from its first one.
 /// No run begins with three hours without a row.

@@ -76,19 +76,6 @@ struct FirstPoint {
   long rollouts = 0;           ///< of fits without a parameter
 };
 
-/// Where the others are once they have followed the observations without a parameter that has no
-/// effect where it is, such as the friction of what is not pushed far enough to slide: it may have
-/// one there. Empty where the fit without it fails.
-Eigen::VectorXd WithoutParameter(const FitOptions& options, int parameter, const Eigen::VectorXd& p,
-                                 LeastSquaresProblem* problem, long* rollouts) {
-  if (problem->entries().size() < 2) return {};
-  ProblemWithHeld held(parameter, p[parameter], problem);
-  const Minimum minimum = Minimise(
-      options, held.Left(p), [] { return 0.0; }, {}, &held);
-  *rollouts += minimum.rollouts;
-  return minimum.status == FitStatus::kFailed ? Eigen::VectorXd() : held.All(minimum.parameters);
-}
-
 /// A point near the initial one at which each parameter changes a residual: the initial point
 /// itself unless a parameter has no effect there; else beside it, or where the others lead without
 /// it. Returns false, with the reason in the result, where there is none.
@@ -134,9 +121,10 @@ bool FindStart(const FitOptions& options, LeastSquaresProblem* problem, Lineariz
         jumps = false;
       }
     }
-    if (!found && round < entries.size()) {
+    for (const bool by_windows : {false, true}) {
+      if (found || round == entries.size()) break;
       const Eigen::VectorXd moved =
-          WithoutParameter(options, parameter, p, problem, &first->rollouts);
+          WithoutParameter(options, parameter, by_windows, p, problem, &first->rollouts);
       found = moved.size() > 0 &&
               linearizer->Linearise(ToInternal(entries, moved), huber, &model, &target);
       if (found) effect = effect_at(moved);
@@ -525,6 +513,8 @@ void TestHeld(const FitOptions& options, LeastSquaresProblem* problem, FitResult
     suspicious = suspicious ||
                  IsAtBound(problem->entries()[k], result->estimate[static_cast<Eigen::Index>(k)]);
   }
+  // A prior that is contradicted is a cause of misfit already.
+  suspicious = suspicious && !uncertainty.contradicts_prior;
   // This is NaN where residuals are rounding.
   if (!suspicious || !std::isfinite(uncertainty.whiteness.correlation)) {
     return;

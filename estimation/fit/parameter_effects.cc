@@ -6,7 +6,10 @@
 #include <vector>
 
 #include "tangible/estimation/fit/block_system.h"
+#include "tangible/estimation/fit/minimise.h"
+#include "tangible/estimation/fit/profile.h"
 #include "tangible/estimation/fit/tolerances.h"
+#include "tangible/estimation/fit/windows.h"
 
 namespace tangible {
 
@@ -59,6 +62,22 @@ void LeaveOutRounding(const Eigen::VectorXd& p, const std::vector<ParameterEntry
     }
     if (is_rounding) (*effect)[k] = 0.0;
   }
+}
+
+Eigen::VectorXd WithoutParameter(const FitOptions& options, int parameter, bool by_windows,
+                                 const Eigen::VectorXd& p, LeastSquaresProblem* problem,
+                                 long* rollouts) {
+  if (problem->entries().size() < 2) return {};
+  ProblemWithHeld held(parameter, p[parameter], problem);
+  if (by_windows) {
+    const FitApproachResult grown = GrowWindows(options, held.Left(p), &held, nullptr);
+    *rollouts += grown.rollouts;
+    return grown.iterations > 0 ? held.All(grown.parameters) : Eigen::VectorXd();
+  }
+  const Minimum minimum = Minimise(
+      options, held.Left(p), [] { return 0.0; }, {}, &held);
+  *rollouts += minimum.rollouts;
+  return minimum.status == FitStatus::kFailed ? Eigen::VectorXd() : held.All(minimum.parameters);
 }
 
 }  // namespace tangible

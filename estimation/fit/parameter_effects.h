@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "tangible/estimation/fit/fit.h"
 #include "tangible/estimation/fit/linearisation.h"
 
 namespace tangible {
@@ -21,5 +22,14 @@ int FindNoEffect(const Eigen::VectorXd& effect);
 /// the parameter is moved by a little.
 void LeaveOutRounding(const Eigen::VectorXd& p, const std::vector<ParameterEntry>& entries,
                       Linearizer* linearizer, Eigen::VectorXd* effect);
+
+/// Where the others are once they have followed the observations without a parameter that has no
+/// effect where it is, such as the friction of what is not pushed far enough to slide: it may have
+/// one there. By windows they follow what comes first: a ball that is too slow to reach a wall
+/// before its data have turned back learns its speed from those before. Empty where the fit without
+/// it fails. Counts its runs.
+Eigen::VectorXd WithoutParameter(const FitOptions& options, int parameter, bool by_windows,
+                                 const Eigen::VectorXd& p, LeastSquaresProblem* problem,
+                                 long* rollouts);
 
 }  // namespace tangible

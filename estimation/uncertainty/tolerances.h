@@ -34,6 +34,12 @@ inline constexpr double kDeviationByMedian = 1.4826;
 /// Of sqrt(2 / (N − P)), the standard deviation of the reduced chi-square: a reduced chi-square
 /// that is above 1 by more says that the model or sigma is wrong.
 inline constexpr double kChiSquareDeviations = 5.0;
+/// Of 1.17 / sqrt(N), the standard deviation of a median's scale: with Huber's loss residuals are
+/// judged by their median, because outliers are what the loss is there for.
+inline constexpr double kMedianDeviations = 5.0;
+inline constexpr double kDeviationOfMedian = 1.17;
+/// Of the prior's sigma: an estimate that is farther from its prior's centre contradicts it.
+inline constexpr double kContradictsPrior = 4.0;
 /// Of 1, a probability: residuals count as correlated where white residuals have such a correlation
 /// with a smaller probability.
 inline constexpr double kWhitenessProbability = 1e-4;

@@ -6,6 +6,7 @@
 
 #include "tangible/estimation/uncertainty/decomposition.h"
 #include "tangible/estimation/uncertainty/tolerances.h"
+#include "tangible/math/median.h"
 #include "tangible/math/scalar.h"
 #include "tangible/render/html.h"
 
@@ -82,6 +83,7 @@ class Estimator {
 
   Uncertainty Run() {
     FindFree();
+    WarnOfPriors();
     WarnOfResiduals();
     if (num_free_ == 0) {
       return result_;
@@ -121,8 +123,40 @@ class Estimator {
     }
   }
 
+  void WarnOfPriors() {
+    for (size_t k = 0; k < entries_.size(); ++k) {
+      if (!entries_[k].prior) continue;
+      const Prior& prior = *entries_[k].prior;
+      const double estimate = estimate_[static_cast<Eigen::Index>(k)];
+      const double apart = EvaluatePrior(prior, estimate).residual;
+      if (!(std::abs(apart) > kContradictsPrior)) continue;
+      result_.contradicts_prior = true;
+      result_.warnings.push_back(
+          "the observations contradict the prior of '" + entries_[k].name + "': the estimate " +
+          CompactNumber(estimate, 6) + " is " + CompactNumber(std::abs(apart), 3) +
+          " of its sigma " + (apart > 0.0 ? "above " : "below ") + CompactNumber(prior.center, 6) +
+          ": the prior or the model is wrong, and the interval mixes both");
+    }
+  }
+
+  // With Huber's loss some residuals are expected to be large, and they do not widen the intervals:
+  // the others tell whether sigma is right.
+  bool MedianExplained() const {
+    if (!(options_.huber > 0.0)) return false;
+    std::vector<double> sizes;
+    for (size_t b = 0; b < blocks_.size(); ++b) {
+      for (int i = 0; i < problem_.num_observation_rows(static_cast<int>(b)); ++i) {
+        sizes.push_back(std::abs(blocks_[b].residuals[i]));
+      }
+    }
+    const double freedom = static_cast<double>(sizes.size()) - static_cast<double>(num_free_);
+    return freedom > 0.0 && kDeviationByMedian * Median(std::move(sizes)) <=
+                                1.0 + kMedianDeviations * kDeviationOfMedian / std::sqrt(freedom);
+  }
+
   void WarnOfResiduals() {
     static_cast<ResidualQuality&>(result_) = JudgeResiduals(problem_, blocks_, num_free_);
+    result_.too_large = result_.too_large && !MedianExplained();
     if (result_.too_large) {
       result_.warnings.push_back("residuals are larger than sigma explains (reduced chi-square " +
                                  CompactNumber(result_.reduced_chi_square, 3) +

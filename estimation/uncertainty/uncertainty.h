@@ -76,6 +76,7 @@ struct Uncertainty : ResidualQuality {
   std::vector<std::string> messages;  ///< a parameter: why it has no interval; else empty
   double condition = 1.0;             ///< of J with unit columns, over the parameters that are free
   std::vector<std::string> warnings;  ///< of the whole
+  bool contradicts_prior = false;     ///< the observations contradict a parameter's prior
   /// J_i C J_iᵀ of each observation row i, the part of it that the parameters fit. Empty unless
   /// requested.
   Eigen::VectorXd leverages;

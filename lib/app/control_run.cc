@@ -331,6 +331,8 @@ struct PredictiveRun {
   VectorX<double> squared_errors;
   std::string failure;        // of the first plan that failed: where and why
   bool left_maximum = false;  // in any plan
+  long without_effect = 0;    // plans, from the first on, without effect on any target
+  std::string unreached;      // those targets, of the first plan
   // The first contact in a plan by fixed steps through which its derivatives are not the motion's.
   std::string discrete_map;
   std::string error;         // of the plant
@@ -429,6 +431,13 @@ PredictiveRun Control(const ControlFile& file, const ControlRunOptions& wanted, 
       run.failure = "in step " + std::to_string(k) + ": " + controller.last().message;
     }
     const Plan& plan = controller.last().plan;
+    if (controller.last().status != IlqrStatus::kFailed && run.without_effect == k) {
+      const ControlProblem problem{map, &cost, x, file.low, file.high, k};
+      const UnreachedTargets unreached = FindUnreachedTargets(problem, plan);
+      if (unreached.all && run.without_effect++ == 0) {
+        run.unreached = NamesOf(file, unreached.terms);
+      }
+    }
     if (run.discrete_map.empty() && plan.states.rows() > plan.controls.rows()) {
       run.discrete_map = map->DiscreteMapOf(k, plan.states, plan.controls);
     }
@@ -515,12 +524,21 @@ std::string RunPredictive(const std::string& name, const ControlFile& file, cons
                             made.failure);
   }
   if (made.left_maximum) run->warnings.push_back(WarningOfMaximum());
+  const bool no_effect = made.without_effect == static_cast<long>(made.seconds.size());
+  if (no_effect) {
+    run->verdict = {"no_effect_on_target",
+                    "the controls have no effect on " + made.unreached +
+                        " in any plan; try a longer horizon or terms at its end, starts or "
+                        "sampling, or another initial",
+                    false};
+  }
   const Certificate certificate = CertifyPlayed(file, made.controls);
   // A plan looks ahead to impacts that the run which is played may never come to.
   Certificate of_plans = certificate;
   if (of_plans.discrete_map.empty()) of_plans.discrete_map = made.discrete_map;
   WarnOfDiscreteMap(of_plans, &run->warnings);
-  run->result = {{"status", "done"},
+  run->result = {{"status", no_effect ? run->verdict.status : "done"},
+                 {"message", run->verdict.message},
                  {"cost", made.cost},
                  {"final_state", FinalState(of_plant, made.states)},
                  {"plans", made.seconds.size()},
@@ -550,7 +568,7 @@ std::string RunPredictive(const std::string& name, const ControlFile& file, cons
                               "than the model, or acceleration_sigma is too small");
     }
   }
-  run->verdict.status = "done";
+  if (!no_effect) run->verdict.status = "done";
   run->scene = plant;
   run->scene.simulation.duration = static_cast<double>(made.controls.rows()) * plant.simulation.dt;
   run->states = std::move(made.states);

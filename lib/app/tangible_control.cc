@@ -70,14 +70,18 @@ std::string WriteRun(const std::string& path, const ControlFile& file, const Con
   return WriteAllOrNone(files);
 }
 
+int ReportVerdict(const std::string& path, const ControlRun& run) {
+  if (run.verdict.holds) return kExitDone;
+  return ReportError(path + ": " + run.verdict.status + ": " + run.verdict.message);
+}
+
 int WritePlan(const std::string& path, const ControlFile& file) {
   ControlRun run;
   std::string error = MakePlan(path, file, {.threads = FLAGS_threads}, &run);
   if (error.empty()) error = WriteRun(path, file, run);
   if (!error.empty()) return ReportError(error);
   if (!FLAGS_out.empty()) PrintBesideMotion(run);
-  if (run.verdict.holds) return kExitDone;
-  return ReportError(path + ": " + run.verdict.status + ": " + run.verdict.message);
+  return ReportVerdict(path, run);
 }
 
 int Predict(const std::string& path, const ControlFile& file) {
@@ -93,7 +97,7 @@ int Predict(const std::string& path, const ControlFile& file) {
   error = RunPredictive(path, file, plant, FLAGS_plant.empty() ? file.scene_path : FLAGS_plant,
                         options, &run);
   if (error.empty()) error = WriteRun(path, file, run);
-  return error.empty() ? kExitDone : ReportError(error);
+  return error.empty() ? ReportVerdict(path, run) : ReportError(error);
 }
 
 int Main(int argc, char** argv) {

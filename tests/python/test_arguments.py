@@ -110,7 +110,7 @@ WRONG: list[tuple[Callable[[], Any], type[Exception], str]] = [
     (lambda: tangible.plan(problem(), threads=2.5), TypeError,  # type: ignore[arg-type]
      "threads: expected a whole number from 0 to 256, got 2.5"),
     (lambda: tangible.plan(problem(), initial=[1]), TypeError,  # type: ignore[arg-type]
-     "initial: expected a plan or a dict {path: a number for each step}, got list"),
+     "initial: expected a plan, a file that it saved, or a dict {path: a number for each step}, got list"),
     (lambda: tangible.mpc(problem(), plant=[1]), TypeError,  # type: ignore[arg-type]
      "plant: expected a Scene, a scene file or a dict of its JSON, got list"),
     (lambda: tangible.mpc(problem(), budget="a"), TypeError,  # type: ignore[arg-type]

@@ -205,3 +205,40 @@ def test_frames_go_by_the_names_of_their_columns() -> None:
     pushed = tangible.Rollout(scene, [], ["forces/fa/force/x", "forces/fb/force/x"])
     controls = pandas.DataFrame({"forces/fb/force/x": [2.0] * 10, "forces/fa/force/x": [1.0] * 10})
     assert np.array_equal(pushed(controls=controls), pushed(controls=np.tile([1.0, 2.0], (10, 1))))
+
+
+def coasting(**keys: Any) -> tangible.Scene:
+    scene = tangible.Scene(gravity=[0, 0], simulation={"dt": 0.1, "duration": 1, "stepping": "event"})
+    scene.add_body("b", mass=1, inertia=1, position=[0, 0], velocity=[3, 0], **keys)
+    return scene
+
+
+def test_what_a_dict_of_the_state_leaves_is_as_the_parameters_make_it() -> None:
+    rollout = tangible.Rollout(coasting(), ["bodies/b/velocity/x", "bodies/b/position/x"])
+    given = {"b/y": 2.0}
+    assert rollout([1, 5], given) == pytest.approx([6, 2, 0, 1, 0, 0], abs=1e-12)
+    rows = rollout([[1, 5], [2, 6]], {"b/y": [2.0, 3.0]})
+    assert rows[:, :4] == pytest.approx(np.array([[6, 2, 0, 1], [8, 3, 0, 2]]), abs=1e-12)
+    jacobian = rollout.jacobian([1, 5], given)
+    expected = np.zeros((6, 2))
+    expected[0] = [1, 1]
+    expected[3, 0] = 1
+    assert jacobian.parameters == pytest.approx(expected, abs=1e-12)
+    assert jacobian.certificate
+    for smoothing in (None, tangible.Smoothing(everywhere=True)):
+        kinks = "element" if smoothing is None else "smoothed"
+        states, pull = rollout.vjp([[1, 5], [2, 6]], given, kinks=kinks, smoothing=smoothing)
+        assert states[:, 0] == pytest.approx([6, 8])
+        bars = np.zeros((2, 6))
+        bars[:, 0] = [1, 2]
+        assert pull(bars)[0] == pytest.approx(np.array([[1, 1], [2, 2]]), abs=1e-12)
+    assert rollout.jvp(([1, 5], given, None), ([1, 0], None, None))[1] == pytest.approx(expected[:, 0])
+    # What is given does not depend on the parameters.
+    x = rollout.jacobian([1, 5], {"b/x": 0.0})
+    assert x.states[0] == pytest.approx(1)
+    assert x.parameters[0] == pytest.approx([1, 0])
+
+
+def test_a_dict_of_values_is_no_list_of_paths() -> None:
+    with pytest.raises(TypeError, match="values are given where it is called"):
+        tangible.Rollout(coasting(), {"bodies/b/mass": 2.0})  # type: ignore[arg-type]

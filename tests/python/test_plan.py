@@ -256,3 +256,42 @@ def test_plans_are_interrupted_and_release_the_lock() -> None:
     for worker in workers:
         worker.join()
     assert len(results) == 3 and len(set(results)) == 1
+
+
+def test_plans_without_an_effect_on_the_target_are_said() -> None:
+    cart = {
+        "gravity": [0, 0],
+        "bodies": [{"name": "c", "mass": 2, "inertia": 1, "position": [0, 0]}],
+        "forces": [{"name": "f", "body": "c", "force": [0, 0]}],
+        "simulation": {"dt": 0.1, "duration": 1, "stepping": "event"},
+    }
+
+    def run(coordinate: str, horizon: float) -> tangible.MpcResult:
+        return tangible.mpc(
+            {
+                "scene": tangible.Scene(cart),
+                "controls": [{"path": "forces/f/force/x", "low": -20, "high": 20}],
+                "cost": [
+                    {"state": f"c/{coordinate}", "target": 1, "weight": 100},
+                    {"control": "forces/f/force/x", "weight": 0.01},
+                ],
+                "horizon": 0.1,
+                "mpc": {"duration": 1, "horizon": horizon},
+            }
+        )
+
+    # The cost of one step counts its first state alone; a force along x does not lift.
+    assert run("x", 0.1).status == "no_effect_on_target"
+    lifted = run("y", 0.5)
+    assert lifted.status == "no_effect_on_target"
+    assert "no effect on" in lifted.data["message"]
+    assert run("x", 0.2).status == "done"
+
+
+def test_a_plan_goes_on_from_a_file_that_another_saved(tmp_path: Path) -> None:
+    problem = balance()
+    del problem["mpc"]
+    first = tangible.plan(problem)
+    first.save(tmp_path / "plan.csv")
+    for initial in (str(tmp_path / "plan.csv"), tmp_path / "plan.csv"):
+        assert tangible.plan(problem, initial=initial).cost == pytest.approx(first.cost, rel=1e-9)

@@ -116,7 +116,7 @@ def test_mistakes_are_said() -> None:
         simulation.step()
     simulation.reset()
     for wrong, said in [([1.0, 2.0], r"action: expected shape \(1,\)"), ({"x": 1.0}, "expected one of forces/push"),
-                        ([np.nan], "action: expected finite numbers"), ([[1.0]], r"action: expected shape \(1,\)")]:
+                        ([np.nan], "action forces/push/force/x: expected a finite number, got NaN"), ([[1.0]], r"action: expected shape \(1,\)")]:
         with pytest.raises(ValueError, match=said):
             simulation.step(wrong)
     with pytest.raises(ValueError, match="state: expected finite numbers"):
@@ -217,3 +217,46 @@ def test_a_process_that_is_forked_off_goes_on() -> None:
         os.kill(child, signal.SIGKILL)
         os.waitpid(child, 0)
     assert done and os.WEXITSTATUS(status) == 7
+
+
+def two_masses(second: float) -> tangible.Scene:
+    scene = tangible.Scene(gravity=[0, 0], simulation={"dt": 0.02, "duration": 0})
+    for name, mass, x in (("a", 2.0, 0.0), ("b", second, 5.0)):
+        scene.add_body(name, mass=mass, inertia=1, position=[x, 0])
+        scene.add_force(f"on_{name}", body=name, force=[mass * mass, 0])
+    return scene
+
+
+def test_parameters_make_what_a_dict_of_the_state_leaves() -> None:
+    velocity = "bodies/a/velocity/x"
+    scene = two_masses(3.0)
+    drawn = tangible.Simulation(scene, domains={velocity: [0.1, 0.2, 0.3]}, batch=8)
+    states = drawn.reset({"a/y": 1.0}, seed=0)
+    assert (states[:, 1] == 1.0).all()
+    assert len(set(states[:, 3])) > 1
+    assert (states[:, 3] == drawn.row_parameters[:, 0]).all()
+    noisy = tangible.Simulation(scene, noise={velocity: 0.5})
+    assert noisy.reset({"a/y": 1.0}, seed=0)[3] == noisy.row_parameters[0, 0] != 0.0
+
+
+def test_noise_of_numbers_that_differ_is_refused() -> None:
+    with pytest.raises(ValueError, match="name them one by one"):
+        tangible.Simulation(two_masses(3.0), noise={"bodies/*/mass": 0.1})
+    equal = tangible.Simulation(two_masses(2.0), noise={"bodies/*/mass": 0.1})
+    equal.reset(seed=0)
+    assert equal.row_parameters[0, 0] != 2.0
+
+
+def test_without_an_action_each_force_is_the_scenes_own_also_without_steps() -> None:
+    simulation = tangible.Simulation(two_masses(3.0), ["forces/*/force/x"])
+    simulation.reset()
+    assert simulation.step(steps=10)[3::6] == pytest.approx([0.4, 0.6])
+
+
+def test_a_refused_action_leaves_the_rows_as_they_are() -> None:
+    simulation = tangible.Simulation(two_masses(3.0), ["forces/on_a/force/x"], batch=3)
+    simulation.reset()
+    with pytest.raises(tangible.TangibleError, match="row 1: action forces/on_a/force/x: .* got NaN"):
+        simulation.step([[1.0], [float("nan")], [1.0]])
+    assert simulation.step([[1.0], [1.0], [1.0]])[:, 3] == pytest.approx([0.01] * 3)
+    assert (simulation.steps == 1).all()

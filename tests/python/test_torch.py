@@ -365,3 +365,39 @@ def test_wrong_arguments_are_said() -> None:
         RolloutLayer(ball(), names, on_failure="x")
     with pytest.raises(TypeError, match="^function: expected a tangible.Rollout, got int$"):
         rollout(3)  # type: ignore[arg-type]
+
+
+def masses(first: float, second: float) -> tangible.Scene:
+    scene = tangible.Scene(gravity=[0, 0], simulation={"dt": 0.02, "duration": 0.4})
+    for name, mass in (("a", first), ("b", second)):
+        scene.add_body(name, mass=mass, inertia=1, position=[5 * (name == "b"), 0])
+        scene.add_force(f"on_{name}", body=name, force=[1, 0])
+    return scene
+
+
+def test_a_layer_does_not_make_masses_equal() -> None:
+    with pytest.raises(ValueError, match="name them one by one"):
+        RolloutLayer(masses(2, 3), ["bodies/*/mass"])
+    assert RolloutLayer(masses(2, 2), ["bodies/*/mass"]).values().tolist() == [2.0]
+
+
+def test_a_tangent_of_forward_mode_is_refused() -> None:
+    from torch.autograd import forward_ad
+
+    function = tangible.Rollout(masses(2, 3), ["bodies/a/mass"])
+    for needed in (False, True):
+        mass = torch.tensor([2.0], dtype=torch.float64, requires_grad=needed)
+        with forward_ad.dual_level(), pytest.raises(NotImplementedError):
+            rollout(function, forward_ad.make_dual(mass, torch.ones_like(mass)))
+
+
+def test_the_saved_state_of_a_layer_has_its_formulas() -> None:
+    path = ["bodies/ball/friction"]
+    first = RolloutLayer(ball(), path)
+    with torch.no_grad():
+        first.q += 0.5
+    smooth = ball()
+    smooth["bodies"][0]["friction"] = 0.0
+    second = RolloutLayer(smooth, path)
+    second.load_state_dict(first.state_dict())
+    assert second.values().tolist() == first.values().tolist()

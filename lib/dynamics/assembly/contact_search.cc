@@ -19,10 +19,6 @@ constexpr double kRoomOfBoxes = 8.0;
 // Up to so many bodies a search has memory for all pairs from its start on.
 constexpr size_t kFewBodies = 32;
 
-double SpeedOf(const double* twist, double radius) {
-  return std::sqrt(twist[0] * twist[0] + twist[1] * twist[1]) + std::abs(twist[2]) * radius;
-}
-
 // The rate of a joint's coordinate, rad/s or m/s.
 double CoordinateRate(const JointIndex& joint, const JointRows<double>& rows, const double* twist) {
   double rate = 0.0;
@@ -169,15 +165,25 @@ void ContactSearch::FindLimits(const Model<double>& model, const State<double>& 
   }
 }
 
+// m/s: a speed that is no larger than the error of a closed contact's gap over the step is not an
+// approach.
+double ContactSearch::SlowApproach(const State<double>& state, const ActiveContact& contact,
+                                   double h) const {
+  return kNoApproach * (bound_[contact.a] + bound_[contact.b]) +
+         lengths_.Rounding(state, contact.a, contact.b) / h;
+}
+
+double ContactSearch::SmallerRadius(const ActiveContact& contact) const {
+  return std::min(lengths_.radius(contact.a), lengths_.radius(contact.b));
+}
+
 // Replaces a contact with a corner ahead by those of bodies that pass by each other, as a box that
-// slides over flush tiles. A speed that is no larger than the error of a closed contact's gap over
-// the step is not an approach.
+// slides over flush tiles.
 ContactsAhead ContactSearch::FindPassed(const Model<double>& model, const State<double>& state,
                                         const ActiveContact& contact, double approach,
                                         double h) const {
-  const double rounding = lengths_.Rounding(state, contact.a, contact.b);
-  const double slow = kNoApproach * (bound_[contact.a] + bound_[contact.b]) + rounding / h;
-  const double size = std::min(lengths_.radius(contact.a), lengths_.radius(contact.b));
+  const double slow = SlowApproach(state, contact, h);
+  const double size = SmallerRadius(contact);
   if (!(approach < -slow) || size == 0.0) {
     return ContactsAhead();
   }
@@ -198,9 +204,8 @@ ContactsAhead ContactSearch::FindPassed(const Model<double>& model, const State<
 bool ContactSearch::PassesCorner(const Model<double>& model, const State<double>& state,
                                  const ActiveContact& contact, double approach, double h) const {
   if (!HaveCorners(*model.structure, contact)) return false;
-  const double rounding = lengths_.Rounding(state, contact.a, contact.b);
-  const double slow = kNoApproach * (bound_[contact.a] + bound_[contact.b]) + rounding / h;
-  const double size = std::min(lengths_.radius(contact.a), lengths_.radius(contact.b));
+  const double slow = SlowApproach(state, contact, h);
+  const double size = SmallerRadius(contact);
   return approach < -slow && contact.gap + h * approach < 0.0 &&
          contact.gap >= -lengths_.Touch(state, contact.a, contact.b) &&
          PassesBy(model, state, contact, approach, size, slow);

@@ -54,6 +54,8 @@ class ContactSearch {
                   const AssemblyScratch<double>& scratch, ActiveContact contact, PartPair parts,
                   std::span<const ContactFeature> listed,
                   std::vector<ActiveContact>* contacts) const;
+  double SlowApproach(const State<double>& state, const ActiveContact& contact, double h) const;
+  double SmallerRadius(const ActiveContact& contact) const;
   bool PassesCorner(const Model<double>& model, const State<double>& state,
                     const ActiveContact& contact, double approach, double h) const;
   ContactsAhead FindPassed(const Model<double>& model, const State<double>& state,

@@ -43,6 +43,11 @@ double AngleOf(const State<T>& state, int a, int b) {
                   std::abs(ValueOf(state.pose[3 * b + 2])));
 }
 
+/// The largest speed of a body's points within `radius` (m) of its centre of mass, m/s, at most.
+inline double SpeedOf(const double* twist, double radius) {
+  return std::sqrt(twist[0] * twist[0] + twist[1] * twist[1]) + std::abs(twist[2]) * radius;
+}
+
 /// The largest distance of a body's shape and contact points from its centre of mass, m; 0 of a
 /// body without any. Half-planes are not counted.
 double RadiusOf(const Model<double>& model, int body);

@@ -324,6 +324,39 @@ bool ContactSolver::SolveByLemke(const ContactProblem<double>& problem,
                                                  : by_restarts() || by_dense();
 }
 
+// Both faces of a slot may press on the body between them by any equal impulses. Those of the last
+// step would go on for ever, and friction with them, after the load that caused them has ended.
+void ContactSolver::ReleaseSqueeze(const ContactProblem<double>& problem,
+                                   const ContactSolverOptions& options,
+                                   ContactSolution<double>* solution, ContactSolverReport* report) {
+  const auto slides = [&](size_t i) {
+    return SlidingSign(solution->modes[i]) != 0.0 && solution->normal_impulse[i] != 0.0;
+  };
+  int sliding = 0;
+  for (size_t i = 0; i < problem.contacts.size(); ++i) sliding += slides(i) ? 1 : 0;
+  if (sliding < 2 || !system_.is_regularised()) return;
+  trial_ = *solution;
+  for (std::vector<double>* impulses :
+       {&centre_.joint_impulse, &centre_.normal_impulse, &centre_.tangent_impulse}) {
+    std::fill(impulses->begin(), impulses->end(), 0.0);
+  }
+  if (!SolveWithModes(problem, &trial_, report)) return;
+  scales_.Compute(problem, *solution);
+  bool differs = false;
+  for (size_t k = 0; k < trial_.motion.size(); ++k) {
+    const double speed = scales_.speed[k / 3];
+    const double scale = k % 3 == 2 ? speed / scales_.lever[k / 3] : speed;
+    differs = differs || std::abs(trial_.motion[k] - solution->motion[k]) > kSqueezeMatters * scale;
+  }
+  int worst = -1;
+  const double residual =
+      differs ? BalancedResidual(problem, options.tolerance, &trial_, &worst) : HUGE_VAL;
+  if (!(residual <= options.tolerance)) return;
+  std::swap(*solution, trial_);
+  report->residual = residual;
+  report->worst_contact = worst;
+}
+
 ContactSolverReport ContactSolver::Solve(const ContactProblem<double>& problem,
                                          const ContactSolverOptions& options,
                                          ContactSolution<double>* solution) {
@@ -331,6 +364,7 @@ ContactSolverReport ContactSolver::Solve(const ContactProblem<double>& problem,
   const int regularised = system_.regularised_steps();
   ContactSolverReport report = problem.has_rolling ? SolveRolling(problem, options, solution)
                                                    : RunPortfolio(problem, options, solution);
+  if (report.solved && !problem.has_rolling) ReleaseSqueeze(problem, options, solution, &report);
   report.fallbacks.whole_system = system_.expansions() - expansions;
   report.fallbacks.regularised = system_.regularised_steps() - regularised;
   return report;

@@ -7,7 +7,7 @@
 //    where it satisfies every inequality. Modes that are contradicted are changed and the system is
 //    solved again, as long as fewer are contradicted from round to round. Where rows are redundant
 //    each solve is a proximal step from the last impulses, which change as little as the data
-//    require.
+//    require; where the motion depends on which they are, it is one from impulses of 0.
 // 2. Where there are many contacts, a descent from the guess (contact_descent.h), which changes
 //    many modes at a time, and pivoting (contact_pivoting.h) from where it ends; then pivoting from
 //    the guess. Both have a bounded number of pivots: they search among the impulses of redundant
@@ -130,6 +130,10 @@ class ContactSolver {
                       ContactSolverReport* report,
                       int most_beyond = std::numeric_limits<int>::max());
   void SetCentre(const ContactSolution<double>& solution);
+  // Where contacts that slide squeeze a body by more than its load, and are slowed by that, takes
+  // the solution with the same modes and the least impulses.
+  void ReleaseSqueeze(const ContactProblem<double>& problem, const ContactSolverOptions& options,
+                      ContactSolution<double>* solution, ContactSolverReport* report);
   // False at once where more than `most_beyond` impulses are plainly beyond their limits in the
   // solution of the given modes.
   bool SolveByModeChanges(const ContactProblem<double>& problem,

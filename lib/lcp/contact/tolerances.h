@@ -59,6 +59,9 @@ inline constexpr double kProximal = 1e-9;
 /// Of the unit of z / s of the row: the proximal term for goals below 1e-15, for which its effect
 /// on the equations has to be smaller.
 inline constexpr double kLastProximal = 1e-10;
+/// Of the speed of a body: a motion that the choice of impulses changes by less does not depend on
+/// them.
+inline constexpr double kSqueezeMatters = 1e-9;
 /// Of mean z s / κ: the polish is tried after each goal; the last goal is repeated because rounding
 /// may stop the iteration for one step only.
 inline constexpr double kInteriorPointGoals[] = {1e-10, 1e-14, 1e-18, 1e-22,

@@ -70,6 +70,8 @@ class ContactSystem {
   /// factorisation decides that. Otherwise they read only the factors, and any problem may be
   /// passed.
   bool needs_problem() const { return regularised_ || masses_differ_; }
+  /// Whether rows depend on each other, so that the factors have δ.
+  bool is_regularised() const { return regularised_; }
   /// Exchanges the symbolic factorisation of the system, which must be factorised anew before the
   /// next solve.
   void SwapPattern(std::shared_ptr<BlockLuPattern>* pattern) { lu_.SwapPattern(pattern); }

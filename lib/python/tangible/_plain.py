@@ -96,6 +96,11 @@ def paths(values: Sequence[str], name: str) -> list[str]:
     """The paths as a list; one string alone, of which each letter would be a path, is refused."""
     if isinstance(values, str):
         raise TypeError(f"{name}: expected a list of paths, got the text {values!r}: [{values!r}]")
+    if isinstance(values, Mapping):
+        # Whose values would be dropped.
+        raise TypeError(
+            f"{name}: expected a list of paths, got {said(values)}: values are given where it is called"
+        )
     if not isinstance(values, Iterable):
         raise TypeError(f"{name}: expected a list of paths, got {said(values)}")
     found = list(values)

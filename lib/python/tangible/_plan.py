@@ -225,7 +225,7 @@ class MpcResult(_Controlled):
     """What a run over a receding horizon has been.
 
     Attributes:
-        status: "done".
+        status: "done", or "no_effect_on_target" (`data["message"]` says of which).
         cost: Of the run.
         paths, controls, times, names, final_state: As of a `Plan`, of what was played.
         states: Of the plant, shape (steps + 1, states).
@@ -260,7 +260,7 @@ class MpcResult(_Controlled):
         )
 
 
-Initial = Union[Plan, MpcResult, Mapping[str, Any]]
+Initial = Union[Plan, MpcResult, Mapping[str, Any], str, "os.PathLike[str]"]
 
 
 def _table(initial: Any, problem: Problem) -> str:
@@ -284,8 +284,10 @@ def _table(initial: Any, problem: Problem) -> str:
 def _make(problem: ProblemLike, folder: str | os.PathLike[str], initial: Initial | None) -> Problem:
     """A problem from its file, or from its JSON, in which a scene and controls may stand."""
     maker = Maker()
+    if isinstance(initial, (str, os.PathLike)):
+        initial = {"file": os.path.abspath(initial)}
     if initial is not None and not isinstance(initial, _Controlled):
-        mapping(initial, "initial", "a plan or a dict {path: a number for each step}")
+        mapping(initial, "initial", "a plan, a file that it saved, or a dict {path: a number for each step}")
     if isinstance(problem, Mapping):
         data = dict(problem)
         name = str(Path(file_name(folder, "folder", "a folder's name")) / "plan")
@@ -344,7 +346,8 @@ def plan(
             may stand as a `Scene` or dict, and `initial` as a plan or as {path: a number a step}.
         folder: Where files that a dict names are looked for.
         initial: Controls from which the plan begins, in the place of the problem's: a plan, or
-            {path: shape (steps,)}, or {"file": a file that `Plan.save` has written}.
+            {path: shape (steps,)}, or a file that `Plan.save` has written, as its name or as
+            {"file": name}.
         threads: Of `starts` and `sampling`; 0: one a core. Results have the same bits with any.
         callback: Called after each iteration with `start`, `iteration`, `cost` (before the
             iteration), `gradient`, `step` and `seconds`; what it raises ends the plan. With several

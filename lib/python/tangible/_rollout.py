@@ -227,6 +227,7 @@ class Rollout:
             core, paths(parameters, "parameters"), paths(controls, "controls"), steps
         )
         self._defaults = self._core.defaults()
+        self._start: _core.Rollout | None = None
 
     @property
     def parameters(self) -> list[str]:
@@ -292,6 +293,7 @@ class Rollout:
             x = _array(initial_state, "initial_state", self.outputs, own_x)
         if controls is not None:
             u = _array(controls, "controls", self.controls, own_u)
+        left = self._left(initial_state)
         batched = p.ndim == 2 or u.ndim == 3 or (x is not None and x.ndim == 2)
         sizes = {a.shape[0] for a, axes in ((p, 1), (x, 1), (u, 2)) if a is not None and a.ndim > axes}
         if len(sizes) > 1:
@@ -305,7 +307,44 @@ class Rollout:
                 return np.ascontiguousarray(array[None])
             return np.ascontiguousarray(np.broadcast_to(array, (rows, *array.shape)))
 
-        return spread(p, 1), None if x is None else spread(x, 1), spread(u, 2), batched
+        p, x, u = spread(p, 1), None if x is None else spread(x, 1), spread(u, 2)
+        if x is not None and left and parameters is not None:
+            begun, statuses, _ = self._begin().run(p, None, u, self.threads)
+            x = np.array(x)
+            for row, status in enumerate(statuses):
+                if status == "done":  # what is refused is refused again, in the words of its run
+                    x[row, left] = begun[row, 0, left]
+        return p, x, u, batched
+
+    def _left(self, initial_state: Numbers | None) -> list[int]:
+        """Which numbers of the state a dict leaves as the parameters make them."""
+        names = initial_state if isinstance(initial_state, Mapping) else named(initial_state)
+        if names is None or not self.parameters:
+            return []
+        return [k for k, name in enumerate(self.outputs) if name not in names]
+
+    def _begin(self) -> _core.Rollout:
+        """The states at the start as a function of the same inputs."""
+        if self._start is None:
+            self._start = _core.Rollout(self.scene.core, self.parameters, self.controls, [0])
+        return self._start
+
+    def _from_start(
+        self, initial_state: Numbers | None, p: Floats, u: Floats
+    ) -> Callable[[Floats, Floats], None]:
+        """What adds to the derivatives by parameters (rows, P) those by the numbers of the initial
+        state (rows, S) that a dict leaves as the parameters make them."""
+        left = self._left(initial_state)
+        if not left:
+            return lambda by_parameters, by_state: None
+        start = _core.Recorded(self._begin(), p, None, u, self.threads)
+
+        def add(by_parameters: Floats, by_state: Floats) -> None:
+            bars = np.zeros((len(by_state), 1, by_state.shape[1]))
+            bars[:, 0, left] = by_state[:, left]
+            by_parameters += start.adjoint(bars)[0]
+
+        return add
 
     def _finite(self, p: Floats, x: Floats | None, u: Floats, batched: bool, on_failure: str) -> None:
         """Refuses what the engine's messages would name in their own words, unless rows may fail."""
@@ -385,14 +424,17 @@ class Rollout:
             array = zeros if value is None else _array(value, f"tangent of {name}", names, zeros)
             return np.ascontiguousarray(np.broadcast_to(array, (rows, *zeros.shape)))
 
-        arrays = (
-            p,
-            x,
-            u,
-            direction(0, "parameters", self.parameters),
-            direction(1, "initial_state", self.outputs),
-            direction(2, "controls", self.controls),
-        )
+        along_p = direction(0, "parameters", self.parameters)
+        along_x = direction(1, "initial_state", self.outputs)
+        along_u = direction(2, "controls", self.controls)
+        left = self._left(primals[1])
+        if left:
+            start = self._begin().tangent(
+                p, None, u, along_p, np.zeros_like(along_x), np.zeros_like(along_u), self.threads
+            )
+            along_x = np.array(along_x)
+            along_x[:, left] += start[3][:, 0, left]
+        arrays = (p, x, u, along_p, along_x, along_u)
         states, statuses, messages, along = _executor.of_rows(
             executor, "tangent", self._core, arrays, self.threads
         )
@@ -434,7 +476,8 @@ class Rollout:
         self._finite(p, x, u, batched, on_failure)
         smoothing = smoothing or Smoothing()
         if kinks == "smoothed" and smoothing.everywhere:
-            return self._vjp_of_mean(p, x, u, batched, on_failure, smoothing)
+            add = self._from_start(initial_state, p, u)
+            return self._vjp_of_mean(p, x, u, batched, on_failure, smoothing, add)
         recorded = _core.Recorded(self._core, p, x, u, self.threads)
         states, statuses, messages = recorded.outputs
         self._check(statuses, messages, batched, on_failure)
@@ -445,6 +488,7 @@ class Rollout:
             raise _core.TangibleError(f"{f'row {row}: ' if batched else ''}derivative: {verdict}")
         rows = [row for row, _ in smoothed]
         average = self._average(p, x, u, rows, smoothing) if rows else None
+        add = self._from_start(initial_state, p, u)
 
         def pull(cotangent: ArrayLike) -> tuple[Floats, Floats, Floats]:
             bars = floats(cotangent, "cotangent")
@@ -456,6 +500,7 @@ class Rollout:
                 found = average(rows_of_bars[rows])
                 for into, mean in zip((by_parameters, by_state, by_controls), found):
                     into[rows] = mean
+            add(by_parameters, by_state)
             if batched:
                 return by_parameters, by_state, by_controls
             return by_parameters[0], by_state[0], by_controls[0]
@@ -464,7 +509,7 @@ class Rollout:
 
     def _vjp_of_mean(
         self, p: Floats, x: Floats | None, u: Floats, batched: bool, on_failure: str,
-        smoothing: Smoothing,
+        smoothing: Smoothing, add: Callable[[Floats, Floats], None],
     ) -> tuple[Floats, Callable[[ArrayLike], tuple[Floats, Floats, Floats]]]:
         """`vjp` with all rows smoothed: their own derivatives are not needed."""
         states, statuses, messages = self._core.run(p, x, u, self.threads)
@@ -482,6 +527,7 @@ class Rollout:
             if average is not None:
                 for into, mean in zip(found, average(bars.reshape(states.shape)[done])):
                     into[done] = mean
+            add(found[0], found[1])
             by_parameters, by_state, by_controls = (
                 found if batched else [values[0] for values in found]
             )
@@ -559,6 +605,12 @@ class Rollout:
         self._check([status], [message], False, "raise")
         matrix = all_columns[0] if self._single else all_columns
         num_p, num_s = p.shape[1], self._core.num_states
+        left = self._left(initial_state)
+        if left:
+            _, status, message, _, start = self._begin().jacobian(p, None, u, method)
+            self._check([status], [message], False, "raise")
+            by_left = matrix[..., [num_p + k for k in left]]
+            matrix[..., :num_p] += by_left @ start[0][left, :num_p]
         by_controls = matrix[..., num_p + num_s :]
         return Jacobian(
             states[0] if self._single else states,
@@ -617,6 +669,17 @@ class Rollout:
             f"Rollout({self.scene!r}, parameters={self.parameters}, controls={self.controls}, "
             f"steps={self.num_steps})"
         )
+
+
+def one_value(function: Rollout, names: Sequence[str], what: str) -> None:
+    """Refuses parameters whose path matches numbers that differ: one value would make them equal."""
+    own = function._defaults[0][0]
+    for name in names:
+        if np.isnan(own[function.parameters.index(name)]):
+            raise ValueError(
+                f"{what}: {name}: expected numbers that are equal, as one value sets all of them; "
+                "name them one by one"
+            )
 
 
 def check_rollout(function: object) -> None:

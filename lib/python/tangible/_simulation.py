@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _core
 from ._plain import choice, integers, mapping, number, paths, seed_of, whole
-from ._rollout import MOST_THREADS, Numbers, Rollout, _array, finite, floats
+from ._rollout import MOST_THREADS, Numbers, Rollout, _array, finite, floats, one_value
 from ._scene import Scene, SceneLike
 
 Floats = NDArray[np.float64]
@@ -82,7 +82,11 @@ class Simulation:
         self._core = self._make()
         self._set = np.tile(self._rollout._defaults[0][0], (self._rows, 1))  # parameters of each row
         own = self._rollout._defaults[2][0]
-        self._own = own[0] if len(own) else np.array([read[path] for path in self.controls])
+        if not len(own) and self.controls:
+            dt = json.loads(read.core.to_json())["simulation"]["dt"]
+            a_step = Rollout(Scene(read, simulation={"duration": dt}), names, controls)
+            own = a_step._defaults[2][0]
+        self._own = own[0] if self.controls else np.zeros(0)
         self._noise = np.zeros(len(outputs))
         self._spread_of_parameters = np.zeros(len(names))
         for name, deviation in noise.items():
@@ -91,6 +95,7 @@ class Simulation:
                 self._noise[outputs.index(name)] = spread
             else:
                 self._spread_of_parameters[names.index(name)] = spread
+                one_value(self._rollout, [name], "noise")
         self._dt = float(json.loads(read.core.to_json())["simulation"]["dt"])
         self._domains = self._read_domains(domains)
         self._generator = np.random.default_rng()
@@ -252,6 +257,12 @@ class Simulation:
         if state is not None:
             base = self._rollout.default_initial_state
             x = self._spread(state, "state", self.outputs, base, count)
+            left = self._rollout._left(state)
+            if left and count > 0:
+                # What a dict leaves is as the parameters make it.
+                self._check(self._core.reset(chosen, np.ascontiguousarray(p), None), chosen)
+                x = np.array(x)
+                x[:, left] = self._core.states()[np.ix_(chosen, left)]
         self._check(self._core.reset(chosen, np.ascontiguousarray(p), x), chosen)
         if self._noise.any():
             # The state is known now, also where parameters make it.
@@ -276,6 +287,9 @@ class Simulation:
         own = self._own
         u = own if action is None else action
         values = self._spread(u, "action", self.controls, own, self._rows)
+        if self.on_failure == "raise":
+            # Before any row has gone on.
+            finite(values, "action ", self.controls, self.batch is not None, own)
         self._check(self._core.step(values, steps), range(self._rows))
         return self.state
 

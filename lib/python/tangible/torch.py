@@ -13,10 +13,11 @@ from typing import Any
 
 import numpy as np
 import torch
+import torch.autograd.forward_ad as forward_ad
 
 from ._plain import choice, mapping, paths, said
 from ._rollout import Rollout as _Rollout
-from ._rollout import Smoothing, check_kinks, check_rollout
+from ._rollout import Smoothing, check_kinks, check_rollout, one_value
 from ._scene import SceneLike
 
 __all__ = ["RolloutLayer", "rollout"]
@@ -123,6 +124,10 @@ def rollout(
         if not tensor.is_floating_point():
             # States, and gradients, of its dtype would be cut to whole numbers.
             raise TypeError(f"{name}: expected a tensor of floating-point numbers, got {tensor.dtype}")
+        if forward_ad.unpack_dual(tensor).tangent is not None:
+            raise NotImplementedError(
+                f"{name}: expected a tensor without a tangent of forward mode; Rollout.jvp takes one"
+            )
     like = next(iter(given.values()), torch.empty(0, dtype=torch.float64))
     if not torch.is_grad_enabled() or not any(tensor.requires_grad for tensor in given.values()):
         # Without a derivative to take no tape is needed, and a kink is none of the caller's business.
@@ -183,6 +188,7 @@ class RolloutLayer(torch.nn.Module):
             mapping(bounds, "bounds", "a dict {path: (low, high)}")
         choice(on_failure, "on_failure", "raise", "nan")
         check_kinks(kinks, smoothing)
+        one_value(self.function, parameters, "parameters")
         start = torch.as_tensor(self.function.default_parameters)
         limits = dict(bounds or {})
         for name in [*(positive or []), *limits]:
@@ -197,14 +203,22 @@ class RolloutLayer(torch.nn.Module):
             raise ValueError("positive: expected a scene whose values are > 0")
         if bool((given & ((start <= low) | (start >= high))).any()):
             raise ValueError("bounds: expected the scene's values between them")
-        inside = (start > low) & (start < high)
-        self._bounded = inside & torch.isfinite(low) & torch.isfinite(high)
-        self._positive = inside & (low == 0.0) & torch.isinf(high)
         self.register_buffer("start", start)
         self.register_buffer("low", low)
         self.register_buffer("high", high)
-        share = torch.where(self._bounded, (start - low) / (high - low), torch.full_like(start, 0.5))
-        self.q = torch.nn.Parameter(torch.where(self._bounded, torch.logit(share), 0.0 * start))
+        share = torch.where(self._bounded(), (start - low) / (high - low), torch.full_like(start, 0.5))
+        self.q = torch.nn.Parameter(torch.where(self._bounded(), torch.logit(share), 0.0 * start))
+
+    # Which formula of `values` holds follows from what is saved with a layer's state.
+
+    def _inside(self) -> torch.Tensor:
+        return (self.start > self.low) & (self.start < self.high)
+
+    def _bounded(self) -> torch.Tensor:
+        return self._inside() & torch.isfinite(self.low) & torch.isfinite(self.high)
+
+    def _positive(self) -> torch.Tensor:
+        return self._inside() & (self.low == 0.0) & torch.isinf(self.high)
 
     def _range(
         self, path: str, limits: Mapping[str, tuple[float, float]], positive: Sequence[str]
@@ -232,14 +246,15 @@ class RolloutLayer(torch.nn.Module):
 
     def values(self) -> torch.Tensor:
         """The parameters p, shape (P,), in SI units."""
-        positive = self.start * torch.exp(torch.where(self._positive, self.q, 0.0 * self.q))
-        low = torch.where(self._bounded, self.low, torch.zeros_like(self.low))
-        high = torch.where(self._bounded, self.high, torch.ones_like(self.high))
+        is_positive, is_bounded = self._positive(), self._bounded()
+        positive = self.start * torch.exp(torch.where(is_positive, self.q, 0.0 * self.q))
+        low = torch.where(is_bounded, self.low, torch.zeros_like(self.low))
+        high = torch.where(is_bounded, self.high, torch.ones_like(self.high))
         bounded = low + (high - low) * torch.sigmoid(self.q)
         free = self.start + self.q
         # The value is cut off at the range, the derivative is not.
         free = free + (torch.minimum(torch.maximum(free, self.low), self.high) - free).detach()
-        return torch.where(self._positive, positive, torch.where(self._bounded, bounded, free))
+        return torch.where(is_positive, positive, torch.where(is_bounded, bounded, free))
 
     def forward(
         self,

@@ -64,7 +64,7 @@ inline LawDistances LawDistancesOf(const Model<double>& model, const StepRecord&
   LawDistances law;
   law.has_recovery = contact.gap < 0.0 && recovery > 0.0 && contact.law != ContactLaw::kRestitution;
   law.recovery = {gap_speed + recovery, std::max(recovery, -gap_speed)};
-  law.has_restitution = contact.IsOfShapes();
+  law.has_restitution = !contact.IsPureFriction();
   if (!law.has_restitution) return law;
   law.approach = ApproachOf(*model.structure, record, i);
   law.reach = record.h * law.approach.free;

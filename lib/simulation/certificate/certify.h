@@ -132,6 +132,7 @@ class RolloutCertifier {
                       const ActiveContact& contact, const std::string& what);
   void AddLimitsAtRelease(const Model<double>& model, long step, const Segment& segment);
   void AddClosedAtOnce(const Model<double>& model, long step, const Segment& segment);
+  void AddTwoLimits(const Model<double>& model, long step, const Segment& segment);
   void AddQuality(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes,
                   ContactSystem* system);
   void AddUnloaded(const Model<double>& model, long step, const Impulses& impact);
@@ -185,8 +186,12 @@ class RolloutCertifier {
     ActiveContact contact;
     double time = 0.0;
   };
-  std::vector<Strike> strikes_;       ///< of the last impact, and of those shortly before it
-  std::vector<Strike> slips_ended_;   ///< of the last instant at which contacts stopped sliding
+  /// Contacts of the whole model that the last motions held, until when; without those that their
+  /// events opened or handed over.
+  std::vector<Strike> held_;
+  std::vector<Strike> stuck_;        ///< the same of those that stuck as another one was lifted off
+  std::vector<Strike> strikes_;      ///< of the last impact, and of those shortly before it
+  std::vector<Strike> slips_ended_;  ///< of the last instant at which contacts stopped sliding
   const Impulses* impact_ = nullptr;  ///< the last one in a step, until the motion that follows it
   const Segment* start_ = nullptr;  ///< the instant at which the run starts, until the first motion
   /// A located event near a step's end, of contacts of the whole model.

@@ -447,6 +447,7 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
   if (!segment->starts && (step > 0 || segment->time > 0.0)) {
     AddClosedAtOnce(model, step, *segment);
   }
+  AddTwoLimits(model, step, *segment);
   closed_ = segment->contacts;
   if (Wanted(segment->edge_before) ||
       (segment->edge_before >= 0 && Wanted(segment->event_number))) {
@@ -527,8 +528,10 @@ void RolloutCertifier::AddTouchBehind(const Model<double>& model, long step, con
   const ModelStructure& s = *model.structure;
   const bool is_closed = std::any_of(last.contacts.begin(), last.contacts.end(),
                                      [&](const ActiveContact& c) { return c.SameAs(contact); });
-  const double speed = SpeedsOf(model, last.after, contact).normal;
-  if (is_closed || !(speed < -Negligible(model, speed))) return;
+  const ContactSpeeds speeds = SpeedsOf(model, last.after, contact);
+  const double speed = speeds.normal;
+  // What slides along a face that it touches approaches it by rounding.
+  if (is_closed || !(speed < -Negligible(model, std::hypot(speed, speeds.slip)))) return;
   ContactRows<double> rows;
   EvaluateActiveRows(model, last.after, contact, &rows);
   const double margin = std::max(rows.geometry.gap, 0.0) / (-speed * s.settings.dt);

@@ -5,6 +5,9 @@
 #include <cmath>
 
 #include "tangible/dynamics/elements/seam_contacts.h"
+#include "tangible/simulation/certificate/certify.h"
+#include "tangible/simulation/certificate/certify_place_inl.h"
+#include "tangible/simulation/events/event_search.h"
 
 namespace tangible {
 namespace {
@@ -49,6 +52,11 @@ bool Closed(const Segment& segment, const ActiveContact& contact) {
                    ? other.IsOfShapes() && other.a == contact.a && other.b == contact.b
                    : other.SameAs(contact);
       });
+}
+
+bool Has(const std::vector<ActiveContact>& contacts, const ActiveContact& contact) {
+  return std::any_of(contacts.begin(), contacts.end(),
+                     [&](const ActiveContact& other) { return other.SameAs(contact); });
 }
 
 // Whether the contact has a gap: shapes, or a joint and its limit.
@@ -218,6 +226,100 @@ void FindGrazes(const Model<double>& model, const EventRecord& record, double mo
   for (int p = 0; p < record.num_parts; ++p) {
     if (!record.parts[p]->is_impulses) {
       finder.Add(record.parts[p]->segment);
+    }
+  }
+}
+
+namespace {
+
+// The contacts that touch and do not move along their normals at a state.
+std::vector<ActiveContact> AtRest(const Model<double>& model, const State<double>& state) {
+  EventSearch search(model);
+  double reach = 0.0;
+  for (int body = 0; body < model.structure->num_bodies(); ++body) {
+    reach = std::max(reach, search.lengths().Touch(state, body, body));
+  }
+  std::vector<ActiveContact> found;
+  search.FindContacts(model, state, reach, &found);
+  std::erase_if(found, [&](const ActiveContact& contact) {
+    const double normal = SpeedsOf(model, state, contact).normal;
+    return contact.gap > search.lengths().Touch(state, contact.a, contact.b) ||
+           std::abs(normal) > Negligible(model, normal);
+  });
+  return found;
+}
+
+}  // namespace
+
+// What reaches two limits at once moves along the way of one of them, or of both: beside it along
+// that of the first. A box whose friction is the ratio of its sides slides under a push that it
+// cannot hold; with any more it would tip. A contact that the last motion held, and that no event
+// has opened, opens with no speed then; or one that stuck slides as another one is lifted off.
+void RolloutCertifier::AddTwoLimits(const Model<double>& model, long step, const Segment& segment) {
+  const double end = segment.time + segment.length;
+  const auto in_whole = [&](const ActiveContact& contact) {
+    return island_ != nullptr ? island_->InWhole(contact) : contact;
+  };
+  if (!(segment.length > 0.0)) {
+    if (!segment.starts) return;
+    for (const ActiveContact& contact : AtRest(model, segment.before)) {
+      held_.push_back({in_whole(contact), end});
+    }
+    return;
+  }
+  const auto add = [&](double margin, const ActiveContact& contact, const char* what) {
+    AddMargin(margin, {model.structure.get(), step, segment.time, 0, &contact, ContactMode::kOpen},
+              what);
+  };
+  const auto speed = [](const State<double>& state, int body) {
+    return std::hypot(state.twist[3 * body], state.twist[3 * body + 1]);
+  };
+  const auto opens = [&](const ActiveContact& contact) {
+    if (Has(segment.contacts, contact)) return;
+    const ContactSpeeds before = SpeedsOf(model, segment.before, contact);
+    const ContactSpeeds after = SpeedsOf(model, segment.after, contact);
+    const double moved =
+        std::abs(after.slip - before.slip) + std::abs(after.normal) +
+        std::abs(speed(segment.after, contact.a) - speed(segment.before, contact.a)) +
+        std::abs(speed(segment.after, contact.b) - speed(segment.before, contact.b));
+    if (moved > Negligible(model, moved) && std::abs(before.normal) <= kNearKinkMargin * moved) {
+      add(std::abs(after.normal) / moved, contact, "opens");
+    }
+  };
+  const auto slides = [&](const ActiveContact& contact) {
+    for (size_t i = 0; i < segment.contacts.size(); ++i) {
+      if (segment.contacts[i].SameAs(contact) && SlidingSign(segment.modes[i]) != 0.0) {
+        add(0.0, contact, "friction limit");
+      }
+    }
+  };
+  // Takes those of the bodies that are looked at; what comes later than the last motion is new.
+  const auto take = [&](std::vector<Strike>* list, const auto& look) {
+    std::erase_if(*list, [&](const Strike& one) {
+      const ActiveContact contact =
+          island_ != nullptr ? island_->InIsland(one.contact) : one.contact;
+      if (contact.a < 0 || contact.b < 0) return false;
+      if (std::abs(segment.time - one.time) <= kSameTime * model.structure->settings.dt) {
+        look(contact);
+      }
+      return true;
+    });
+  };
+  take(&held_, opens);
+  take(&stuck_, slides);
+  const bool lifts = segment.release.empty() && segment.event == EventKind::kLiftOff;
+  // An event that opens contacts of a pair, or hands one over to another feature. Several that let
+  // go together move as they were seen to.
+  const auto is_changed = [&](const ActiveContact& contact) {
+    return segment.release.empty() && contact.IsBetweenTheSame(segment.event_contact) &&
+           (lifts || segment.event == EventKind::kTouch);
+  };
+  for (size_t i = 0; i < segment.contacts.size(); ++i) {
+    const ActiveContact& contact = segment.contacts[i];
+    if (!contact.IsOfShapes()) continue;
+    if (!is_changed(contact) && Has(loaded_, contact)) held_.push_back({in_whole(contact), end});
+    if (lifts && segment.modes[i] == ContactMode::kSticking) {
+      stuck_.push_back({in_whole(contact), end});
     }
   }
 }

@@ -36,6 +36,16 @@ std::vector<bool> Struck(const ModelStructure& s, const Impulses& impact) {
   return struck;
 }
 
+// Whether a contact of an impact closes with a speed: what slides along a face that it touches
+// approaches it by rounding.
+bool Approaches(const Model<double>& model, const Impulses& impact, size_t i) {
+  const ActiveContact& c = impact.contacts[i];
+  const ContactBlock<double>& block = impact.problem.contacts[i];
+  const double normal = RelativeSpeed(impact.before, c.a, block.normal_a, c.b, block.normal_b);
+  const double slip = RelativeSpeed(impact.before, c.a, block.tangent_a, c.b, block.tangent_b);
+  return normal < -Negligible(model, std::hypot(normal, slip));
+}
+
 }  // namespace
 
 // The time, in steps, since the last impact that moved a body of a contact that approaches.
@@ -88,11 +98,7 @@ void RolloutCertifier::AddEndsOfSlips(const Model<double>& model, long step,
     coupled.Connect(s, contacts);
     for (size_t i = 0; i < impact.contacts.size(); ++i) {
       const ActiveContact& struck = impact.contacts[i];
-      const ContactBlock<double>& block = impact.problem.contacts[i];
-      const double before =
-          RelativeSpeed(impact.before, struck.a, block.normal_a, struck.b, block.normal_b);
-      if (before < -Negligible(model, before) &&
-          coupled.GroupOf(struck) == coupled.GroupOf(contact)) {
+      if (Approaches(model, impact, i) && coupled.GroupOf(struck) == coupled.GroupOf(contact)) {
         AddMargin(distance, {&s, step, impact.time, i, &struck, impact.solution.modes[i]},
                   "an impact as a contact stops sliding");
       }
@@ -109,12 +115,7 @@ void RolloutCertifier::AddSimultaneous(const Model<double>& model, long step,
   const std::vector<bool> struck = Struck(s, impact);
   std::vector<size_t> approaching;
   for (size_t i = 0; i < impact.contacts.size(); ++i) {
-    const ActiveContact& c = impact.contacts[i];
-    const ContactBlock<double>& block = impact.problem.contacts[i];
-    const double before = RelativeSpeed(impact.before, c.a, block.normal_a, c.b, block.normal_b);
-    if (before < -Negligible(model, before)) {
-      approaching.push_back(i);
-    }
+    if (Approaches(model, impact, i)) approaching.push_back(i);
   }
   if (approaching.empty()) {
     return;

@@ -20,10 +20,6 @@ namespace {
 // thousand.
 constexpr long kEvaluationsOfEvent = 1000;
 
-double SpeedOf(const double* twist, double radius) {
-  return std::hypot(twist[0], twist[1]) + std::abs(twist[2]) * radius;
-}
-
 // What turns the acceleration of a contact's points (m/s²) into its force, kg, or into the torque
 // of friction in a joint that turns, kg m. A force that changes a speed within a step only by
 // rounding counts as 0: where no force acts (no gravity, bodies that coast side by side) all

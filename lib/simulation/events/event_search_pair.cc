@@ -7,6 +7,7 @@
 #include <limits>
 #include <utility>
 
+#include "tangible/dynamics/elements/contacts_ahead.h"
 #include "tangible/dynamics/jacobian/contact_gradient.h"
 #include "tangible/dynamics/model/driven_bodies.h"
 #include "tangible/dynamics/model/tolerances.h"
@@ -190,6 +191,8 @@ class EventSearch::PairSearch {
                          Counts counts);
   // Searches for the first time at which gap + allowed closes, and sets the event to it.
   void SearchFrom(double from, double allowed, Counts counts);
+  // Whether the nearest contact is of corners of a pair that touches and passes by.
+  bool NearestPassesBy(const State<double>& state) const;
   // The acceleration of the gap that the turning of an ellipse gives, m/s²; 0 where neither is one.
   double TurningAcceleration(const State<double>& end) const;
   // Searches for the return of contacts that touch and open; false where one returns at once.
@@ -529,6 +532,7 @@ void EventSearch::PairSearch::SearchFrom(double from, double allowed, Counts cou
     if (!std::isfinite(value)) {
       return value;
     }
+    if (!all && touches_ && value <= touch_ && NearestPassesBy(sample.motion.after)) return touch_;
     const bool approaches = value > 0.0 || !all ||
                             !HaveAt(touching_, nearest_, sample.motion.after) ||
                             SpeedsOf(model_, sample.motion.after, nearest_).normal < -search_.slow_;
@@ -550,6 +554,17 @@ void EventSearch::PairSearch::SearchFrom(double from, double allowed, Counts cou
                       : EventKind::kTouch;
     event_.contact = nearest_;
   }
+}
+
+// At the instant at which a corner passes another one rounding chooses the nearest features: those
+// which the pair is listed with may be others than those that close.
+bool EventSearch::PairSearch::NearestPassesBy(const State<double>& state) const {
+  const Lengths& lengths = search_.lengths_;
+  const double size = std::min(lengths.radius(a_), lengths.radius(b_));
+  if (size == 0.0 || !HaveCorners(*model_.structure, nearest_)) return false;
+  const double approach = SpeedsOf(model_, state, nearest_).normal;
+  return approach < -search_.slow_ &&
+         PassesBy(model_, state, nearest_, approach, size, search_.slow_);
 }
 
 // The height of an ellipse with semi-axes a ≥ b has a second derivative of at most a² / b with

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "tangible/math/interrupt.h"
+#include "tangible/simulation/events/crush.h"
 #include "tangible/simulation/events/ellipse_motion.h"
 #include "tangible/simulation/events/load_speed.h"
 #include "tangible/simulation/events/servo_bounds.h"
@@ -284,6 +285,9 @@ bool EventStepper::SolveImpact(const Model<double>& model, Impulses* impact, Sta
   if (!solved.solved) {
     outcome->residual = solved.residual;
     outcome->message = "impact: " + WhatIsUnsolved(*model.structure, *impact, solved);
+    const std::string who = WhoCannotYield(*model.structure, impact->contacts, impact->problem,
+                                           solved.worst_contact, SolverOptionsOf(settings));
+    if (!who.empty()) outcome->message += ": " + who;
     return false;
   }
   TakeRollingLimits(impact->solution, &impact->problem);

@@ -73,6 +73,7 @@ bool EventStepper::HoldsSlow(const Model<double>& model, Impulses* impact, State
   const double still = SlowSpeed(model, *state);
   const std::vector<ActiveContact> contacts = impact->contacts;
   const std::vector<CoefficientSource> friction = impact->friction;
+  const std::vector<CoefficientSource> restitution = impact->restitution;
   const std::vector<ContactBlock<double>> blocks = impact->problem.contacts;
   const auto speed = [&](const State<double>& at, size_t i) {
     return RelativeSpeed(at, contacts[i].a, blocks[i].normal_a, contacts[i].b, blocks[i].normal_b);
@@ -103,7 +104,12 @@ bool EventStepper::HoldsSlow(const Model<double>& model, Impulses* impact, State
     SetUpProjection(held, *state, impact);
     more = false;
     if (!flow_.Project(model, impact)) {
-      if (std::all_of(holds.begin(), holds.end(), [](char one) { return one != 0; })) return false;
+      if (std::all_of(holds.begin(), holds.end(), [](char one) { return one != 0; })) {
+        impact->contacts = contacts;
+        impact->friction = friction;
+        impact->restitution = restitution;
+        return false;
+      }
       holds.assign(contacts.size(), 1);
       more = true;
       continue;

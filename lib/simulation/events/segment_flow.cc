@@ -384,7 +384,11 @@ bool SegmentFlow::CorrectPoses(const Model<double>& model, Segment* segment, std
         DriftsFar(model, node.problem)) {
       // This happens where links move faster than dt resolves, and where the implicit stage has
       // found a solution other than the one that continues the motion.
-      *message = "joints drift by more than a tenth of their arms in one motion: dt is too large";
+      *message = segment->starts
+                     ? "joints are open by more than a tenth of their arms where the run starts: "
+                       "its initial poses are not on the joints"
+                     : "joints drift by more than a tenth of their arms in one motion: dt is too "
+                       "large";
       return false;
     }
     LeaveRounding(*segment, &node);
@@ -402,11 +406,14 @@ bool SegmentFlow::CorrectPoses(const Model<double>& model, Segment* segment, std
       return true;
     }
     if (k + 1 == kMostCorrections || (k > 0 && errors.share >= last)) {
-      char text[160];
+      char text[256];
       std::snprintf(text, sizeof(text),
                     "projection onto joints and contacts: expected an error of at most %.3g, got "
-                    "%.3g: dt is too large",
-                    errors.allowed, errors.error);
+                    "%.3g: %s",
+                    errors.allowed, errors.error,
+                    segment->starts ? "where the run starts they contradict each other, as a body "
+                                      "does that is larger than its slot"
+                                    : "dt is too large");
       *message = text;
       return false;
     }

@@ -10,9 +10,9 @@
 #include "tangible/dynamics/model/tolerances.h"
 #include "tangible/lcp/system/contact_residual.h"
 #include "tangible/math/interrupt.h"
+#include "tangible/simulation/events/crush.h"
 #include "tangible/simulation/events/segment_flow.h"
 #include "tangible/simulation/events/tolerances.h"
-#include "tangible/simulation/stepping/crush.h"
 
 namespace tangible {
 namespace {

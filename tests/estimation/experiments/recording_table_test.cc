@@ -256,6 +256,48 @@ TEST(RecordingTableTest, ClocksInNanosecondsAndOfSeveralBodies) {
       << error;
 }
 
+// A clock in ms, us or ns begins at 0 where it is told to.
+TEST(RecordingTableTest, AGivenStartOfAClockInPartsOfASecondIsZero) {
+  struct Clock {
+    const char* scale;
+    const char* cells;
+    double from;
+  };
+  for (const Clock& clock :
+       {Clock{"0.001", "1600000000100,1\n1600000000200,2\n1600000000300,3\n", 1600000000.2},
+        Clock{"0.001", "1714476519591,0\n1714476519691,1\n1714476519791,2\n", 1714476519.691},
+        Clock{"1e-9", "1714476519581000000,0\n1714476519681000000,1\n1714476519781000000,2\n",
+              1714476519.681},
+        Clock{"1e-6", "400000,0\n500000,1\n600000,2\n", 0.5}}) {
+    const std::string time = std::string(R"("time": {"column": "t", "scale": )") + clock.scale;
+    const std::string columns = R"("columns": [{"column": "x", "body": "b", "coordinate": "x"}]})";
+    TableOptions options = Mapped("{" + time + "}, " + columns);
+    options.from = clock.from;
+    const Imported from = Import(std::string("t,x\n") + clock.cells, options);
+    ASSERT_TRUE(from.ok) << from.error;
+    ASSERT_EQ(from.recording.rows.size(), 2u) << clock.scale;
+    EXPECT_EQ(from.recording.rows[0].time, 0.0) << clock.scale;
+    EXPECT_EQ(from.recording.rows[1].time, 0.1) << clock.scale;
+    // So does an offset.
+    const Imported shifted =
+        Import(std::string("t,x\n") + clock.cells,
+               Mapped("{" + time + R"(, "offset": -)" + CsvNumber(clock.from) + "}, " + columns));
+    ASSERT_TRUE(shifted.ok) << shifted.error;
+    ASSERT_EQ(shifted.recording.rows.size(), 2u) << clock.scale;
+    EXPECT_EQ(shifted.recording.rows[0].time, 0.0) << clock.scale;
+  }
+}
+
+TEST(RecordingTableTest, RowsBeforeZeroAreCounted) {
+  const std::string cells = "t,x\n-0.2,1\n-0.1,2\n0,3\n0.1,4\n";
+  EXPECT_EQ(Import(cells, Mapped(kOne)).recording.before_zero, 2);
+  TableOptions all = Mapped(kOne);
+  all.from = -0.2;
+  const Imported imported = Import(cells, all);
+  EXPECT_EQ(imported.recording.before_zero, 0);
+  EXPECT_EQ(imported.recording.rows.size(), 4u);
+}
+
 // All that is written reads back to the doubles that were read.
 TEST(RecordingTableTest, WritesAllDigits) {
   std::mt19937 random(5);

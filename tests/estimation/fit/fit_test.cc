@@ -411,5 +411,33 @@ TEST(FitTest, AspectAndLensOfACameraAreFound) {
   }
 }
 
+// A disc that is too slow at first to reach the wall before its data have turned back: restitution
+// has no effect until the speed follows what comes before. x = 2 t, then 1 - 1.4 (t - 0.5).
+TEST(FitTest, ARestitutionHasAnEffectOnceTheSpeedFollowsTheData) {
+  const Scene scene = MakeScene(R"({"gravity": [0, 0], "bodies": [
+    {"name": "p", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0, 0],
+     "velocity": [2, 0]},
+    {"name": "w", "static": true, "shape": {"half_plane": {"normal": [-1, 0], "offset": -1.1}}}],
+    "pairs": [{"bodies": ["p", "w"], "restitution": 0.7}],
+    "simulation": {"dt": 0.01, "duration": 1, "stepping": "event"}})");
+  std::vector<Observation> observations;
+  for (int k = 1; k <= 20; ++k) {
+    const double t = 0.05 * k;
+    observations.push_back(
+        {t, 0, -1, Coordinate::kX, t < 0.5 ? 2.0 * t : 1.0 - 1.4 * (t - 0.5), 0.01});
+  }
+  for (const double initial : {0.5, 0.8, 0.99}) {
+    RolloutResiduals residuals = MakeResiduals(
+        scene, {},
+        {Parameter("bodies/p/velocity/x", initial), Parameter("pairs/p:w/restitution", 0.5)},
+        observations);
+    const FitResult fit = Fit(FitOptions(), &residuals, {});
+    EXPECT_EQ(fit.status, FitStatus::kConverged) << initial << ": " << fit.message;
+    ASSERT_EQ(fit.estimate.size(), 2) << initial;
+    EXPECT_NEAR(fit.estimate[0], 2.0, 1e-6) << initial;
+    EXPECT_NEAR(fit.estimate[1], 0.7, 1e-6) << initial;
+  }
+}
+
 }  // namespace
 }  // namespace tangible

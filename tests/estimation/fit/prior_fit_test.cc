@@ -60,5 +60,47 @@ TEST(PriorFitTest, ALogNormalPriorActsOnRatios) {
   EXPECT_NEAR(result.uncertainty.prior_share[0], 1.0, 1e-6);
 }
 
+TEST(PriorFitTest, APriorThatTheDataContradictIsNamed) {
+  const auto warns = [](const FitResult& fit) {
+    return fit.uncertainty.contradicts_prior &&
+           fit.uncertainty.warnings.front().rfind(
+               "the observations contradict the prior of 'gravity/y'", 0) == 0;
+  };
+  const FitResult plain = FitGravity(std::nullopt);
+  const double deviation = plain.uncertainty.standard_deviation[0];
+  // The estimate is the mean of both: half of the way is 10 of its sigma, or 2.
+  EXPECT_TRUE(warns(
+      FitGravity(Prior{PriorKind::kGaussian, plain.estimate[0] + 20.0 * deviation, deviation})));
+  EXPECT_FALSE(
+      FitGravity(Prior{PriorKind::kGaussian, plain.estimate[0] + 4.0 * deviation, deviation})
+          .uncertainty.contradicts_prior);
+  EXPECT_FALSE(plain.uncertainty.contradicts_prior);
+}
+
+// Every seventh observation is a metre off: what Huber's loss is there for.
+TEST(PriorFitTest, OutliersAreNoReasonToDoubtSigmaWithHubersLoss) {
+  const Scene scene = MakeScene(kFallingBall);
+  std::vector<Observation> observations = Observe(scene, 2, 0.01, 3);
+  const auto fit = [&](double scale) {
+    std::vector<Observation> seen = observations;
+    for (size_t i = 0; i < seen.size(); ++i) {
+      seen[i].sigma *= scale;
+      if (i % 7 == 0) seen[i].value += 1.0;
+    }
+    RolloutResiduals residuals = MakeResiduals(
+        scene, {}, {Parameter("gravity/y", -9.0), Parameter("bodies/ball/velocity/x", 0.5)}, seen);
+    FitOptions options;
+    options.huber = 1.5;
+    return Fit(options, &residuals, {});
+  };
+  const FitResult right = fit(1.0);
+  ASSERT_EQ(right.status, FitStatus::kConverged) << right.message;
+  EXPECT_NEAR(right.estimate[0], -9.81, 0.05);
+  EXPECT_GT(right.uncertainty.reduced_chi_square, 100.0);
+  EXPECT_FALSE(right.uncertainty.too_large);
+  // A sigma that is three times too small is still said.
+  EXPECT_TRUE(fit(1.0 / 3.0).uncertainty.too_large);
+}
+
 }  // namespace
 }  // namespace tangible

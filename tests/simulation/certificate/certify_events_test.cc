@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include "../../support/gradients.h"
 #include "../../support/rescaled.h"
 #include "../../support/scenes.h"
 #include "tangible/dynamics/model/parameter_map.h"
@@ -352,6 +353,33 @@ TEST(CertifyEventsTest, FrictionAtItsLimitBesideAMotorIsAKink) {
   EXPECT_EQ(CertificateFor(slider("-1"), {"joints/j/motor/limit"}).verdict.find("near a kink"), 0u)
       << CertificateFor(slider("-1"), {"joints/j/motor/limit"}).verdict;
   EXPECT_EQ(CertificateFor(slider("-1.5"), {"joints/j/motor/limit"}).verdict, "trustworthy");
+}
+
+// The friction of a cube at rest is the ratio of its sides: a push that it cannot hold lets it
+// slide upright, with less friction too, and with more it tips.
+TEST(CertifyEventsTest, ACubeThatSlidesAtTheLimitOfTippingIsAtAKink) {
+  const auto certified = [](double friction, double start) {
+    const std::string mu = test_scenes::Text(friction);
+    return testing::Jacobian(
+               test_scenes::SceneOf(R"({"gravity": [0, -10], "bodies": [
+                   {"name": "floor", "static": true, "friction": )" +
+                                    mu +
+                                    R"(, "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}},
+                   {"name": "b", "shape": {"box": {"size": [0.2, 0.2]}}, "mass": 1,
+                    "position": [0, 0.1], "friction": )" +
+                                    mu +
+                                    R"(}], "forces": [{"name": "n", "body": "b", "force": [20, 0],
+                    "start": )" + test_scenes::Text(start) +
+                                    R"(}], "simulation": {"dt": 0.01, "duration": 0.5,
+                    "stepping": "event"}})"),
+               {"bodies/*/friction"}, GradientMethod::kTangent)
+        .certificate.verdict;
+  };
+  for (const double start : {0.3, 0.295}) {
+    EXPECT_EQ(certified(1.0, start).rfind("near a kink", 0), 0u) << certified(1.0, start);
+    EXPECT_EQ(certified(0.9, start), "trustworthy");
+    EXPECT_EQ(certified(1.1, start), "trustworthy");
+  }
 }
 
 }  // namespace

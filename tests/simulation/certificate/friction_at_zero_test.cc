@@ -161,5 +161,25 @@ TEST(FrictionAtZeroTest, WhatIsNotFriction) {
   }
 }
 
+// Above it the limit has another law, as a contact has: two masses on a rope that goes taut.
+TEST(FrictionAtZeroTest, ARestitutionOfALimitThatIsZeroJumps) {
+  const auto rope = [](double restitution) {
+    return SceneOf(R"({"gravity": [0, 0], "bodies": [
+        {"name": "r", "mass": 1, "inertia": 1, "position": [0, 0], "velocity": [-1, 0]},
+        {"name": "q", "mass": 2, "inertia": 1, "position": [0.5, 0]}],
+      "joints": [{"name": "j", "type": "distance", "bodies": ["r", "q"],
+                  "anchors": [[0, 0], [0.5, 0]], "limits": [0, 1], "limit_restitution": )" +
+                   Text(restitution) + R"(}], "simulation": {"dt": 0.007, "duration": 1}})");
+  };
+  const std::vector<std::string> path = {"joints/j/limit_restitution"};
+  const Certificate at_zero =
+      testing::Jacobian(rope(0.0), path, GradientMethod::kAdjoint).certificate;
+  EXPECT_NE(at_zero.verdict.find("its restitution is 0, above which"), std::string::npos)
+      << at_zero.verdict;
+  const GradientResult above = testing::Jacobian(rope(0.5), path, GradientMethod::kAdjoint);
+  EXPECT_EQ(above.certificate.verdict, "of the discrete map: trustworthy");
+  EXPECT_NEAR(above.jacobian(3, 0), 2.0 / 3.0, 1e-9);
+}
+
 }  // namespace
 }  // namespace tangible

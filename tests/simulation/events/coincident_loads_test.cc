@@ -48,9 +48,12 @@ void ExpectSides(Scene scene, const std::vector<Sides>& all, const std::string& 
           one.path + ", row " + std::to_string(one.row) + ", dt " + std::to_string(dt);
       for (const GradientMethod method : {GradientMethod::kTangent, GradientMethod::kAdjoint,
                                           GradientMethod::kFiniteDifference}) {
-        const GradientResult both = testing::Jacobian(scene, {one.path}, method);
+        // The certificate is the same whatever the method.
+        const bool first = method == GradientMethod::kTangent;
+        const GradientResult both = testing::Jacobian(
+            scene, {one.path}, method, first ? CertificatePass::kRun : CertificatePass::kSkip);
         const double found = both.jacobian(one.row, 0);
-        EXPECT_TRUE(Names(both, what)) << where << ": " << both.certificate.verdict;
+        EXPECT_TRUE(!first || Names(both, what)) << where << ": " << both.certificate.verdict;
         EXPECT_GE(found, std::min(one.plus, one.minus) - 1e-5) << where;
         EXPECT_LE(found, std::max(one.plus, one.minus) + 1e-5) << where;
       }

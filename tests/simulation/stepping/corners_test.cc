@@ -6,7 +6,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <sstream>
 #include <string>
 #include <utility>
 #include <vector>
@@ -18,12 +17,7 @@
 namespace tangible {
 namespace {
 
-std::string ExactText(double x) {
-  std::ostringstream text;
-  text.precision(17);
-  text << x;
-  return text.str();
-}
+using test_scenes::Text;
 
 struct CornerRun {
   double dt, duration;
@@ -34,8 +28,8 @@ struct CornerRun {
 Scene SceneOfRun(const std::string& bodies, const CornerRun& run) {
   return test_scenes::SceneOf(R"({"gravity": [)" + std::string(run.gravity) + R"(], "bodies": [)" +
                               bodies + R"(], "simulation": {"stepping": ")" + run.stepping +
-                              R"(", "dt": )" + ExactText(run.dt) + R"(, "duration": )" +
-                              ExactText(run.duration) + "}}");
+                              R"(", "dt": )" + Text(run.dt) + R"(, "duration": )" +
+                              Text(run.duration) + "}}");
 }
 
 // The pose and twist of the first body at the end.
@@ -93,6 +87,81 @@ TEST(CornersTest, AConcaveBodyPassesTheEndOfAFace) {
     EXPECT_NEAR(end[3], 1.0, 1e-12) << stepping;
     EXPECT_NEAR(end[4], 0.0, 1e-12) << stepping;
     EXPECT_NEAR(end[5], 0.0, 1e-12) << stepping;
+  }
+}
+
+// The lowest corner of a tilted body glides along a face and past its end, on nothing: at the
+// instant at which both corners meet rounding chooses the nearest features.
+TEST(CornersTest, ATiltedBodyPassesTheEndOfAFace) {
+  const std::vector<std::pair<double, double>> vertices = {{-0.5, -0.2}, {0.5, -0.2}, {0.5, 0.2},
+                                                           {0.0, 0.2},   {0.0, 0.0},  {-0.5, 0.0}};
+  std::string list;
+  for (const auto& [x, y] : vertices) {
+    list += (list.empty() ? "[" : ", [") + Text(x) + ", " + Text(y) + "]";
+  }
+  for (const double angle : {0.5, 0.25 * M_PI, 1.0}) {
+    for (const double start : {0.9, 0.95}) {
+      const double x = start + 0.5 * std::cos(angle) - 0.2 * std::sin(angle);
+      const double y = 0.5 * std::sin(angle) + 0.2 * std::cos(angle);
+      const std::string body = R"({"name": "m", "mass": 1, "inertia": 0.1, "velocity": [1, 0],
+          "shape": {"polygon": {"vertices": [)" +
+                               list + R"(]}}, "angle": )" + Text(angle) + R"(, "position": [)" +
+                               Text(x) + ", " + Text(y) + "]}";
+      const std::string box =
+          StaticGround(R"({"box": {"size": [2, 1]}})", R"(, "position": [0, -0.5])");
+      for (const double dt : {0.01, 0.05}) {
+        for (const char* stepping : {"event", "fixed"}) {
+          const std::vector<double> end =
+              EndNumbersOf(SceneOfRun(body + box, {dt, 0.5, "0, 0", stepping}));
+          EXPECT_NEAR(end[0], x + 0.5, 1e-12) << angle << " " << start << " " << stepping;
+          EXPECT_NEAR(end[1], y, 1e-12) << angle << " " << start << " " << stepping;
+          EXPECT_NEAR(end[5], 0.0, 1e-12) << angle << " " << start << " " << stepping;
+        }
+      }
+    }
+  }
+}
+
+// A face that comes down on one of the same width: the corners of both are one above the other, and
+// each is beside the other body as soon as it is behind its face.
+TEST(CornersTest, AFaceRestsOnOneOfTheSameWidth) {
+  const std::vector<std::string> grounds = {
+      R"({"polyline": {"points": [[-1, -1], [-0.3, -1], [-0.3, 0.4], [0.3, 0.4], [0.3, -1],
+          [1, -1]], "solid": "right"}})",
+      R"({"polygon": {"vertices": [[-0.3, -1], [-0.1, -1], [0, -0.5], [0.1, -1], [0.3, -1],
+          [0.3, 0.4], [-0.3, 0.4]]}})",
+      R"({"box": {"size": [0.6, 0.8]}})"};
+  for (const std::string& ground : grounds) {
+    for (const double width : {0.6, 0.6 - 1e-9, 0.6 - 1e-7, 0.6 + 1e-9}) {
+      const std::string box = R"({"name": "b", "mass": 1, "position": [0, 0.8],
+          "shape": {"box": {"size": [)" +
+                              Text(width) + ", 0.2]}}}";
+      for (const double dt : {0.01, 0.003}) {
+        for (const char* stepping : {"event", "fixed"}) {
+          const std::vector<double> end =
+              EndNumbersOf(SceneOfRun(box + StaticGround(ground), {dt, 0.6, "0, -9.81", stepping}));
+          EXPECT_NEAR(end[0], 0.0, 1e-9) << stepping << " " << dt << " " << width << ground;
+          EXPECT_NEAR(end[1], 0.5, 1e-9) << stepping << " " << dt << " " << width << ground;
+          EXPECT_NEAR(end[2], 0.0, 1e-9) << stepping << " " << dt << " " << width << ground;
+        }
+      }
+    }
+  }
+}
+
+// Equal faces of free bodies meet centrally, e = 0.5.
+TEST(CornersTest, EqualFacesOfFreeBodiesCollide) {
+  const std::string bodies = R"({"name": "l", "mass": 1, "inertia": 0.01, "restitution": 0.5,
+      "position": [0, 0], "shape": {"polygon": {"vertices": [[-0.1, -0.1], [0.1, -0.1], [0.1, 0.1],
+      [0, 0.1], [0, 0], [-0.1, 0]]}}},
+      {"name": "b", "mass": 1, "inertia": 0.01, "restitution": 0.5, "position": [0.5, 0],
+       "velocity": [-1, 0], "shape": {"box": {"size": [0.2, 0.2]}}})";
+  for (const double dt : {0.01, 0.007, 0.1}) {
+    for (const char* stepping : {"event", "fixed"}) {
+      const std::vector<double> end = EndNumbersOf(SceneOfRun(bodies, {dt, 0.5, "0, 0", stepping}));
+      EXPECT_NEAR(end[3], -0.75, 1e-9) << stepping << " " << dt;
+      EXPECT_NEAR(end[5], 0.0, 1e-9) << stepping << " " << dt;
+    }
   }
 }
 
@@ -162,9 +231,9 @@ TEST(CornersTest, ABallOnAFineCurveMovesAsOnASmoothOne) {
       std::string points;
       for (int k = 0; k <= std::lround(1.4 / piece); ++k) {
         const double x = -0.6 + piece * k;
-        points += (k == 0 ? "[" : ", [") + ExactText(x) + ", " + ExactText(0.15 * x * x) + "]";
+        points += (k == 0 ? "[" : ", [") + Text(x) + ", " + Text(0.15 * x * x) + "]";
       }
-      const std::string of_both = R"(, "friction": )" + ExactText(friction);
+      const std::string of_both = R"(, "friction": )" + Text(friction);
       const std::string ball = R"({"name": "b", "mass": 1, "shape": {"circle": {"radius": 0.2}},
           "position": [0, 0.2], "velocity": [0.3, 0], "angular_velocity": -1.5)" +
                                of_both + "}";

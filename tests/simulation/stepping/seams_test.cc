@@ -6,7 +6,6 @@
 
 #include <cmath>
 #include <random>
-#include <sstream>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -19,14 +18,9 @@
 namespace tangible {
 namespace {
 
-std::string Number(double x) {
-  std::ostringstream text;
-  text.precision(17);
-  text << x;
-  return text.str();
-}
+using test_scenes::Text;
 
-std::string Pair(double x, double y) { return "[" + Number(x) + ", " + Number(y) + "]"; }
+std::string Pair(double x, double y) { return "[" + Text(x) + ", " + Text(y) + "]"; }
 
 struct Slide {
   double tilt = 0.0;
@@ -47,8 +41,8 @@ Scene SceneOfSlide(const Slide& slide, Stepping stepping, bool on_tiles) {
   const auto place = [&](double x, double y) {
     return Pair(slide.x + c * x - s * y, slide.y + s * x + c * y);
   };
-  const std::string friction = R"(, "friction": )" + Number(slide.friction) + "}";
-  const std::string angle = R"(, "angle": )" + Number(slide.tilt);
+  const std::string friction = R"(, "friction": )" + Text(slide.friction) + "}";
+  const std::string angle = R"(, "angle": )" + Text(slide.tilt);
   std::string bodies = R"({"name": "box", "mass": 1, "shape": {"box": {"size": )" +
                        Pair(slide.width, slide.height) + R"(}}, "position": )" +
                        place(slide.from, 0.5 * slide.height) + R"(, "velocity": )" +
@@ -105,7 +99,7 @@ TEST(SeamsTest, ABoxSlidesOverFlushTilesAsOverAFloor) {
       Slide slide;
       slide.from = from;
       slide.speed = speed;
-      ExpectAsOnAFloor(slide, "speed " + Number(speed) + " from " + Number(from));
+      ExpectAsOnAFloor(slide, "speed " + Text(speed) + " from " + Text(from));
     }
   }
 }
@@ -263,12 +257,12 @@ Scene SceneOfCourse(const Course& course, Stepping stepping, bool on_tiles) {
   const double c = std::cos(course.tilt);
   const double s = std::sin(course.tilt);
   const auto at = [&](double x, double y) { return Pair(c * x - s * y, s * x + c * y); };
-  const std::string friction = R"(, "friction": 0.5, "angle": )" + Number(course.tilt);
+  const std::string friction = R"(, "friction": 0.5, "angle": )" + Text(course.tilt);
   const std::string how = course.belt == 0.0
                               ? R"("static": true)"
                               : R"("kinematic": true, "velocity": )" + at(course.belt, 0.0);
   const auto tile = [&](int i, double x, double width, double top) {
-    const std::string half = Number(0.5 * width);
+    const std::string half = Text(0.5 * width);
     const std::string box = R"({"box": {"size": )" + Pair(width, 0.4) + "}}";
     const std::string polygon = R"({"polygon": {"vertices": [[-)" + half + ", -0.2], [" + half +
                                 ", -0.2], [" + half + ", 0.2], [-" + half + ", 0.2]]}}";
@@ -289,7 +283,7 @@ Scene SceneOfCourse(const Course& course, Stepping stepping, bool on_tiles) {
   bodies.insert(course.last ? bodies.end() : bodies.begin(),
                 R"({"name": "a", "mass": 1, "inertia": 0.005, "shape": )" + course.shape +
                     R"(, "position": )" + at(-0.5, course.height) + R"(, "velocity": )" +
-                    at(course.speed, 0.0) + R"(, "angular_velocity": )" + Number(course.spin) +
+                    at(course.speed, 0.0) + R"(, "angular_velocity": )" + Text(course.spin) +
                     friction + "}");
   std::string text;
   for (const std::string& body : bodies) {
@@ -344,8 +338,8 @@ TEST(SeamsTest, WhateverMovesOverSeamsMovesAsOnOneFloor) {
     for (const double step : {0.0, 1e-16, 1e-12, 1e-10, -4e-9}) {
       Course stepped = course;
       stepped.step = step;
-      ExpectAsOnOneFloor(stepped, course.shape + ", step " + Number(step) + ", tilt " +
-                                      Number(course.tilt) + ", belt " + Number(course.belt));
+      ExpectAsOnOneFloor(stepped, course.shape + ", step " + Text(step) + ", tilt " +
+                                      Text(course.tilt) + ", belt " + Text(course.belt));
     }
   }
 }
@@ -355,7 +349,7 @@ TEST(SeamsTest, WhateverMovesOverSeamsMovesAsOnOneFloor) {
 TEST(SeamsTest, ADiscLandsJustBeforeASeam) {
   for (const double speed : {1.5, -1.5, 2.7}) {
     Course course{.height = 0.12, .spin = 0.0, .speed = speed, .width = 0.1};
-    ExpectAsOnOneFloor(course, "speed " + Number(speed));
+    ExpectAsOnOneFloor(course, "speed " + Text(speed));
   }
 }
 
@@ -375,7 +369,7 @@ TEST(SeamsTest, TilesOfNearlyTheSameHeight) {
         bodies += std::string(R"({"name": ")") + name +
                   R"(", "static": true, "shape": {"box": {"size": [0.5, 0.4]}}, "friction": 0.2,
                      "position": [)" +
-                  x + ", " + Number(-0.2 + y) + "]}, ";
+                  x + ", " + Text(-0.2 + y) + "]}, ";
       }
       Scene scene = test_scenes::SceneOf(R"({"bodies": [)" + bodies + R"(
           {"name": "a", "shape": {"box": {"size": [0.4, 0.2]}}, "mass": 1, "position": [0, 0.1],
@@ -532,13 +526,13 @@ TEST(SeamsTest, ABoxTipsOffATable) {
   const std::vector<std::pair<double, double>> cases = {{0.0, -1.79338}, {0.2, -2.45354}};
   for (const auto& [friction, omega] : cases) {
     for (const double dt : {0.01, 0.007, 0.005, 0.003, 0.002, 0.0013, 0.001, 0.0005, 0.0002}) {
-      const std::string of_both = R"(, "friction": )" + Number(friction) + "}";
+      const std::string of_both = R"(, "friction": )" + Text(friction) + "}";
       const Scene scene = test_scenes::SceneOf(
           R"({"bodies": [{"name": "box", "mass": 1, "shape": {"box": {"size": [0.4, 0.2]}},
               "position": [-0.3, 1.1], "velocity": [2, 0])" +
           of_both + R"(, {"name": "table", "static": true, "shape": {"box": {"size": [2, 1]}},
               "position": [-1, 0.5])" +
-          of_both + R"(], "simulation": {"dt": )" + Number(dt) + R"(, "duration": 0.4}})");
+          of_both + R"(], "simulation": {"dt": )" + Text(dt) + R"(, "duration": 0.4}})");
       RolloutReport report;
       EXPECT_NEAR(EndOf(scene, &report).twist[2], omega, 8.0 * dt) << friction << " " << dt;
     }

@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tangible/simulation/stepping/crush.h"
+#include "tangible/simulation/events/crush.h"
 
 #include <gtest/gtest.h>
+
+#include <algorithm>
+#include <string>
+#include <utility>
 
 #include "../../support/scenes.h"
 #include "tangible/simulation/stepping/rollout.h"
@@ -19,7 +23,8 @@ RolloutReport RunOf(const std::string& text) {
 // A wall of given velocity pushes discs in a row against a wall that stands still: they cannot go
 // anywhere, whatever the friction.
 TEST(CrushTest, AWallThatCannotYieldIsNamed) {
-  for (const std::string friction : {"0", "0.5"}) {
+  for (const auto& [friction, stepping] :
+       {std::pair<std::string, std::string>("0", "fixed"), {"0.5", "fixed"}, {"0", "event"}}) {
     const RolloutReport report = RunOf(R"({"gravity": [0, 0], "bodies": [
         {"name": "still", "static": true, "shape": {"half_plane": {"normal": [1, 0]}}},
         {"name": "ram", "kinematic": true, "velocity": [-1, 0],
@@ -28,7 +33,8 @@ TEST(CrushTest, AWallThatCannotYieldIsNamed) {
          "friction": )" + friction + R"(},
         {"name": "b", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0.3, 0],
          "friction": )" + friction + R"(}],
-      "simulation": {"dt": 0.01, "duration": 1}})");
+      "simulation": {"dt": 0.01, "duration": 1, "stepping": ")" +
+                                       stepping + R"("}})");
     EXPECT_EQ(report.status, StepStatus::kUnsolved);
     EXPECT_NE(report.message.find("ram, which cannot yield, crushes bodies"), std::string::npos)
         << report.message;
@@ -100,6 +106,57 @@ TEST(CrushTest, OthersAreNotBlamed) {
   ContactProblem<double> problem;
   ModelStructure structure;
   EXPECT_EQ(WhoCannotYield(structure, {}, problem, -1, {}), "");
+}
+
+// A block as wide as its slot, which a force presses against one side for 0.2 s: friction brakes it
+// as long, v = 1 - mu F 0.2. Both sides may press on it by any equal forces afterwards, and do not.
+TEST(CrushTest, NothingSqueezesABlockInASlotBehindItsLoad) {
+  for (const auto& [friction, force] : {std::pair(0.1, 4.0), {0.25, 4.0}, {0.25, 2.0}}) {
+    for (const double dt : {0.01, 0.001, 0.0073}) {
+      const std::string mu = R"(, "friction": )" + test_scenes::Text(friction);
+      Model<double> model;
+      State<double> state;
+      BuildModel(test_scenes::SceneOf(R"({"gravity": [0, 0], "bodies": [
+          {"name": "l", "static": true, "shape": {"half_plane": {"normal": [1, 0], "offset": -0.1}})" +
+                                      mu + R"(},
+          {"name": "r", "static": true, "shape": {"half_plane": {"normal": [-1, 0], "offset": -0.1}})" +
+                                      mu + R"(},
+          {"name": "b", "shape": {"box": {"size": [0.2, 0.1]}}, "mass": 1, "position": [0, 0],
+           "velocity": [0, 1])" + mu + R"(}],
+        "forces": [{"name": "n", "body": "b", "force": [)" +
+                                      test_scenes::Text(force) + R"(, 0], "end": 0.2}],
+        "simulation": {"dt": )" + test_scenes::Text(dt) +
+                                      R"(, "duration": 0.6}})"),
+                 &model, &state);
+      const RolloutReport report = Rollout(model, state, {}, &state);
+      EXPECT_EQ(report.status, StepStatus::kDone) << report.message;
+      EXPECT_NEAR(state.twist[3 * 2 + 1], 1.0 - friction * force * 0.2, 1e-9)
+          << friction << " " << dt;
+    }
+  }
+}
+
+// The places of both sides are rounded, so that a body that just fits is in one of them by 1e-17 m.
+TEST(CrushTest, ABodyThatJustFitsIntoItsSlotMayRestThere) {
+  for (const double left : {0.1, 1.7, -0.4}) {
+    for (const double dt : {0.1, 0.01, 0.001, 1e-4}) {
+      for (const char* gravity : {"0, 0", "0, -9.81"}) {
+        const std::string at = test_scenes::Text(left), to = test_scenes::Text(left + 0.2);
+        const RolloutReport report = RunOf(R"({"gravity": [)" + std::string(gravity) +
+                                           R"(], "bodies": [
+            {"name": "b", "shape": {"box": {"size": [0.2, 0.2]}}, "mass": 1, "position": [)" +
+                                           test_scenes::Text(left + 0.1) + R"(, 0.5]},
+            {"name": "room", "static": true, "shape": {"polyline": {"closed": true,
+             "solid": "right", "points": [[)" +
+                                           at + ", 0], [" + to + ", 0], [" + to + ", 1], [" + at +
+                                           R"(, 1]]}}}],
+            "simulation": {"dt": )" + test_scenes::Text(dt) +
+                                           R"(, "duration": )" +
+                                           test_scenes::Text(std::min(0.2, 200.0 * dt)) + "}}");
+        EXPECT_EQ(report.status, StepStatus::kDone) << left << " " << dt << ": " << report.message;
+      }
+    }
+  }
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tangible/simulation/stepping/crush.h"
+#include "tangible/simulation/events/crush.h"
 
 #include <utility>
 
