@@ -351,6 +351,28 @@ void SegmentFlow::LeaveRounding(const Segment& segment, SolvedNode* node) const 
   }
 }
 
+namespace {
+
+constexpr char kStartsOffItsJoints[] =
+    "joints are open by more than a tenth of their arms where the run starts: its initial poses "
+    "are not on the joints";
+constexpr char kDriftsOffItsJoints[] =
+    "joints drift by more than a tenth of their arms in one motion: dt is too large";
+
+std::string NotProjected(double allowed, double error, bool starts) {
+  char text[256];
+  std::snprintf(text, sizeof(text),
+                "projection onto joints and contacts: expected an error of at most %.3g, got "
+                "%.3g: %s",
+                allowed, error,
+                starts ? "where the run starts they contradict each other, as a body does that is "
+                         "larger than its slot"
+                       : "dt is too large");
+  return text;
+}
+
+}  // namespace
+
 bool SegmentFlow::CorrectPoses(const Model<double>& model, Segment* segment, std::string* message) {
   const ModelStructure& structure = *model.structure;
   const SimulationSettings& settings = structure.settings;
@@ -384,11 +406,7 @@ bool SegmentFlow::CorrectPoses(const Model<double>& model, Segment* segment, std
         DriftsFar(model, node.problem)) {
       // This happens where links move faster than dt resolves, and where the implicit stage has
       // found a solution other than the one that continues the motion.
-      *message = segment->starts
-                     ? "joints are open by more than a tenth of their arms where the run starts: "
-                       "its initial poses are not on the joints"
-                     : "joints drift by more than a tenth of their arms in one motion: dt is too "
-                       "large";
+      *message = segment->starts ? kStartsOffItsJoints : kDriftsOffItsJoints;
       return false;
     }
     LeaveRounding(*segment, &node);
@@ -406,15 +424,7 @@ bool SegmentFlow::CorrectPoses(const Model<double>& model, Segment* segment, std
       return true;
     }
     if (k + 1 == kMostCorrections || (k > 0 && errors.share >= last)) {
-      char text[256];
-      std::snprintf(text, sizeof(text),
-                    "projection onto joints and contacts: expected an error of at most %.3g, got "
-                    "%.3g: %s",
-                    errors.allowed, errors.error,
-                    segment->starts ? "where the run starts they contradict each other, as a body "
-                                      "does that is larger than its slot"
-                                    : "dt is too large");
-      *message = text;
+      *message = NotProjected(errors.allowed, errors.error, segment->starts);
       return false;
     }
     last = errors.share;
