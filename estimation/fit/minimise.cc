@@ -690,7 +690,7 @@ class Minimiser : public ceres::IterationCallback {
         Eigen::VectorXd blocks;
         double target = 0.0;
         const bool done = linearizer_.Cost(q, shared_.huber(), &blocks, &target);
-        if (done && q != q_ && target < cost) {
+        if (done && q != q_ && target < cost - kKinkGain * unit * unit) {
           return false;
         }
       }

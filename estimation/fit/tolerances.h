@@ -89,6 +89,9 @@ inline constexpr double kShiftOfAll = 0.05;
 /// Of the residuals' deviation, along a parameter: the distances from a minimum at a kink at which
 /// the cost has to be higher.
 inline constexpr double kKinkSteps[] = {1e-2, 1e-4};
+/// Of the square of the residuals' deviation: a cost that is lower there by less is as high, as
+/// that of the kink of a few parameters beside which derivatives lead nowhere.
+inline constexpr double kKinkGain = 1e-4;
 /// Of the length of q: a shorter final step is rounding.
 inline constexpr double kPolishedStep = 1e-13;
 /// Of the cost: costs that differ by less do not show which of two points is better.

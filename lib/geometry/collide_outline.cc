@@ -78,7 +78,7 @@ class OutlinePair {
     for (int i = 0; i < other_.Size(); ++i) {
       const Vector2<double> x = PointAt(i);
       const double height = HeightOf(x);
-      if (height < lowest && outline_.IsOver(run_, x) && IsFree(i, -of_.normal) && FacesRun(i)) {
+      if (height < lowest && IsOverRun(i, x) && IsFree(i, -of_.normal) && FacesRun(i, of_.normal)) {
         lowest = height;
         at = i;
       }
@@ -89,7 +89,7 @@ class OutlinePair {
     for (const int i : {other_.Next(at), other_.Previous(at)}) {
       const Vector2<double> x = other_.VertexAt(i);
       if (i != at && (second < 0 || HeightOf(x) < HeightOf(other_.VertexAt(second))) &&
-          x != other_.VertexAt(at) && outline_.IsOver(run_, x) && IsFree(i, -of_.normal)) {
+          x != other_.VertexAt(at) && IsOverRun(i, x) && IsFree(i, -of_.normal)) {
         second = i;
       }
     }
@@ -99,16 +99,40 @@ class OutlinePair {
   /// Whether a vertex of B is the lowest one, or belongs to a face that is nearly parallel to the
   /// run. The end of a face that slides on past a corner is over the other edge of that corner too,
   /// up to rounding, and would be stopped by it.
-  bool FacesRun(int vertex) const {
+  bool FacesRun(int vertex, const Vector2<double>& normal) const {
     if (is_ellipse_ || other_.Size() < 2) return true;
-    const double height = HeightOf(other_.VertexAt(vertex));
+    const auto rise = [&](int to) {
+      return normal.dot(other_.VertexAt(to) - other_.VertexAt(vertex));
+    };
     const int edges[2] = {vertex, other_.Previous(vertex)};
-    return (HeightOf(other_.VertexAt(other_.Next(vertex))) >= height &&
-            HeightOf(other_.VertexAt(other_.Previous(vertex))) >= height) ||
+    return (rise(other_.Next(vertex)) >= 0.0 && rise(other_.Previous(vertex)) >= 0.0) ||
            std::any_of(edges, edges + 2, [&](int edge) {
              const CoreEdge line = other_.Edge(edge);
-             return line.length > 0.0 && -line.Normal().dot(of_.normal) > kFacing;
+             return line.length > 0.0 && -line.Normal().dot(normal) > kFacing;
            });
+  }
+
+  /// Whether a vertex of B is over the run; just behind it and beside its end it is, however near
+  /// the next run is, where it does not face that one: the corner of a body that rocks on a face of
+  /// its own width.
+  bool IsOverRun(int vertex, const Vector2<double>& x) const {
+    if (outline_.IsOver(run_, x)) return true;
+    if (is_ellipse_ || other_.Size() < 2) return false;
+    const int beside = NearerRun(x);
+    return beside >= 0 && !FacesRun(vertex, outline_.run(beside).normal);
+  }
+  /// The run at a convex joint that a point over this one, a little behind both, is nearer to; −1:
+  /// none, and where neighbours hide a part of the outline.
+  int NearerRun(const Vector2<double>& x) const {
+    const double s = of_.tangent.dot(x - of_.start);
+    const double depth = -HeightOf(x);
+    const bool is_shallow = depth > 0.0 && depth <= kBehindFace * of_.length;
+    if (!is_shallow || s < 0.0 || s > of_.length || outline_.HasSeams()) return -1;
+    const bool is_after = outline_.IsAfterStart(run_, x);
+    if (is_after == outline_.IsBeforeEnd(run_, x)) return -1;
+    const OutlineJoint joint = is_after ? of_.after : of_.before;
+    if (joint != OutlineJoint::kConvex) return -1;
+    return is_after ? outline_.Next(run_) : outline_.Previous(run_);
   }
 
   void AddOnRun(int vertex, double height) {
@@ -197,7 +221,8 @@ class OutlinePair {
   // The second contact of faces that are nearly parallel counts too.
   bool IsAllowed(const NormalCone& cone, const CoreEdge& line) const {
     const Vector2<double> direction = -line.Normal();
-    return outline_.IsPolygon() ? cone.Faces(direction) : cone.Contains(direction);
+    const bool is_corner = outline_.IsPolygon() || of_.before == OutlineJoint::kConvex;
+    return is_corner ? cone.Faces(direction) : cone.Contains(direction);
   }
   bool IsOverFace(int edge, const CoreEdge& line, const Vector2<double>& v) const {
     const double s = line.tangent.dot(v - line.start);

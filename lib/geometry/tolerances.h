@@ -32,6 +32,9 @@ inline constexpr double kTurnRounding = 2.0 * std::numeric_limits<double>::epsil
 inline constexpr double kFlushStep = 1e-8;
 /// Of the coordinate: the rounding of the place of one shape relative to another.
 inline constexpr double kSeamRounding = 64.0 * std::numeric_limits<double>::epsilon();
+/// Of the length of a run: a corner that is no deeper behind it than this, and faces no other run,
+/// is a contact of it up to its end.
+inline constexpr double kBehindFace = 1e-3;
 /// Rad: faces that turn by a smaller angle have equal normals.
 inline constexpr double kFlushTurn = 1e-9;
 /// Of the extent of a concave polygon: corners that are no farther inside of its convex hull have

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "tangible/lcp/contact/contact_mode_change.h"
 #include "tangible/lcp/contact/tolerances.h"
@@ -324,37 +325,98 @@ bool ContactSolver::SolveByLemke(const ContactProblem<double>& problem,
                                                  : by_restarts() || by_dense();
 }
 
+namespace {
+
+// Opens the contacts by which what cannot move presses a body from both sides, those of the side
+// that presses less, or of both; whether there are any.
+bool OpenSqueezed(const ContactProblem<double>& problem, ContactSolution<double>* solution) {
+  const auto presses = [&](size_t i) {
+    const ContactBlock<double>& c = problem.contacts[i];
+    return !c.limit_given && (c.a < 0) != (c.b < 0) && solution->modes[i] != ContactMode::kOpen &&
+           solution->normal_impulse[i] > 0.0;
+  };
+  const auto body = [&](size_t i) {
+    return std::max(problem.contacts[i].a, problem.contacts[i].b);
+  };
+  const auto normal = [&](size_t i) {
+    const ContactBlock<double>& c = problem.contacts[i];
+    return c.a < 0 ? c.normal_b : c.normal_a;
+  };
+  const size_t size = problem.contacts.size();
+  std::vector<size_t> opened;
+  for (size_t i = 0; i < size; ++i) {
+    if (!presses(i)) continue;
+    double own = 0.0, against = 0.0;
+    for (size_t k = 0; k < size; ++k) {
+      if (!presses(k) || body(k) != body(i)) continue;
+      const double cosine = normal(i)[0] * normal(k)[0] + normal(i)[1] * normal(k)[1];
+      if (cosine > kSameSide) own += solution->normal_impulse[k];
+      if (cosine < -kSameSide) against += solution->normal_impulse[k];
+    }
+    if (against > 0.0 && own <= against * (1.0 + kSqueezeMatters)) opened.push_back(i);
+  }
+  for (const size_t i : opened) solution->modes[i] = ContactMode::kOpen;
+  return !opened.empty();
+}
+
+double SumOf(const std::vector<double>& impulses) {
+  return std::accumulate(impulses.begin(), impulses.end(), 0.0);
+}
+
+}  // namespace
+
 // Both faces of a slot may press on the body between them by any equal impulses. Those of the last
-// step would go on for ever, and friction with them, after the load that caused them has ended.
+// step would go on for ever, and friction with them, after the load that caused them has ended; or
+// places that are rounded would cause them. Takes the solution with the least that is found.
 void ContactSolver::ReleaseSqueeze(const ContactProblem<double>& problem,
                                    const ContactSolverOptions& options,
                                    ContactSolution<double>* solution, ContactSolverReport* report) {
-  const auto slides = [&](size_t i) {
-    return SlidingSign(solution->modes[i]) != 0.0 && solution->normal_impulse[i] != 0.0;
-  };
+  if (!system_.is_regularised()) return;
   int sliding = 0;
-  for (size_t i = 0; i < problem.contacts.size(); ++i) sliding += slides(i) ? 1 : 0;
-  if (sliding < 2 || !system_.is_regularised()) return;
+  for (size_t i = 0; i < problem.contacts.size(); ++i) {
+    sliding += SlidingSign(solution->modes[i]) != 0.0 && solution->normal_impulse[i] != 0.0 ? 1 : 0;
+  }
+  const auto without_centre = [&] {
+    for (std::vector<double>* impulses :
+         {&centre_.joint_impulse, &centre_.normal_impulse, &centre_.tangent_impulse}) {
+      std::fill(impulses->begin(), impulses->end(), 0.0);
+    }
+  };
+  const auto is_better = [&] {
+    scales_.Compute(problem, *solution);
+    bool differs = false;
+    for (size_t k = 0; k < trial_.motion.size(); ++k) {
+      const double speed = scales_.speed[k / 3];
+      const double scale = k % 3 == 2 ? speed / scales_.lever[k / 3] : speed;
+      differs =
+          differs || std::abs(trial_.motion[k] - solution->motion[k]) > kSqueezeMatters * scale;
+    }
+    if (!differs || SumOf(trial_.normal_impulse) > SumOf(solution->normal_impulse)) return false;
+    int worst = -1;
+    const double residual = BalancedResidual(problem, options.tolerance, &trial_, &worst);
+    if (!(residual <= options.tolerance)) return false;
+    std::swap(*solution, trial_);
+    report->residual = residual;
+    report->worst_contact = worst;
+    return true;
+  };
   trial_ = *solution;
-  for (std::vector<double>* impulses :
-       {&centre_.joint_impulse, &centre_.normal_impulse, &centre_.tangent_impulse}) {
-    std::fill(impulses->begin(), impulses->end(), 0.0);
+  if (OpenSqueezed(problem, &trial_)) {
+    const std::vector<ContactMode> opened = trial_.modes;
+    without_centre();
+    if (SolveWithModes(problem, &trial_, report) && is_better()) return;
+    trial_ = *solution;
+    trial_.modes = opened;
+    if (SolveByModeChanges(problem, options, &trial_, report) && is_better()) return;
+    // The factors are those of the solution again.
+    trial_ = *solution;
+    SetCentre(*solution);
+    SolveWithModes(problem, &trial_, report);
   }
-  if (!SolveWithModes(problem, &trial_, report)) return;
-  scales_.Compute(problem, *solution);
-  bool differs = false;
-  for (size_t k = 0; k < trial_.motion.size(); ++k) {
-    const double speed = scales_.speed[k / 3];
-    const double scale = k % 3 == 2 ? speed / scales_.lever[k / 3] : speed;
-    differs = differs || std::abs(trial_.motion[k] - solution->motion[k]) > kSqueezeMatters * scale;
-  }
-  int worst = -1;
-  const double residual =
-      differs ? BalancedResidual(problem, options.tolerance, &trial_, &worst) : HUGE_VAL;
-  if (!(residual <= options.tolerance)) return;
-  std::swap(*solution, trial_);
-  report->residual = residual;
-  report->worst_contact = worst;
+  if (sliding < 2) return;
+  trial_ = *solution;
+  without_centre();
+  if (SolveWithModes(problem, &trial_, report)) is_better();
 }
 
 ContactSolverReport ContactSolver::Solve(const ContactProblem<double>& problem,

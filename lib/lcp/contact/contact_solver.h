@@ -130,8 +130,8 @@ class ContactSolver {
                       ContactSolverReport* report,
                       int most_beyond = std::numeric_limits<int>::max());
   void SetCentre(const ContactSolution<double>& solution);
-  // Where contacts that slide squeeze a body by more than its load, and are slowed by that, takes
-  // the solution with the same modes and the least impulses.
+  // Where contacts squeeze a body by more than its load, and friction slows or holds it by that,
+  // takes a solution with less impulses, where one is found.
   void ReleaseSqueeze(const ContactProblem<double>& problem, const ContactSolverOptions& options,
                       ContactSolution<double>* solution, ContactSolverReport* report);
   // False at once where more than `most_beyond` impulses are plainly beyond their limits in the

@@ -62,6 +62,9 @@ inline constexpr double kLastProximal = 1e-10;
 /// Of the speed of a body: a motion that the choice of impulses changes by less does not depend on
 /// them.
 inline constexpr double kSqueezeMatters = 1e-9;
+/// A cosine: normals that are as near press on the same side of a body, and against each other
+/// where they are opposite.
+inline constexpr double kSameSide = 0.999;
 /// Of mean z s / κ: the polish is tried after each goal; the last goal is repeated because rounding
 /// may stop the iteration for one step only.
 inline constexpr double kInteriorPointGoals[] = {1e-10, 1e-14, 1e-18, 1e-22,

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 #include <utility>
 
@@ -132,6 +133,70 @@ TEST(CrushTest, NothingSqueezesABlockInASlotBehindItsLoad) {
       EXPECT_EQ(report.status, StepStatus::kDone) << report.message;
       EXPECT_NEAR(state.twist[3 * 2 + 1], 1.0 - friction * force * 0.2, 1e-9)
           << friction << " " << dt;
+    }
+  }
+}
+
+// The same of a block that is held there against gravity: it falls as the force ends. And of one
+// that slides between walls that move with it, or are tilted, which nothing presses: their rounded
+// places come nearer to each other in many steps.
+TEST(CrushTest, NothingHoldsABlockInASlotThatNothingPresses) {
+  const auto twist_of_last = [](const std::string& text) {
+    Model<double> model;
+    State<double> state;
+    BuildModel(test_scenes::SceneOf(text), &model, &state);
+    const RolloutReport report = Rollout(model, state, {}, &state);
+    EXPECT_EQ(report.status, StepStatus::kDone) << report.message;
+    return std::pair(state.twist[3 * 2], state.twist[3 * 2 + 1]);
+  };
+  for (const double dt : {0.02, 0.01, 0.001}) {
+    for (const char* force : {"50", "90"}) {
+      const auto twist = twist_of_last(
+          R"({"gravity": [0, -10], "bodies": [
+          {"name": "l", "static": true, "friction": 0.4,
+           "shape": {"half_plane": {"normal": [1, 0], "offset": 0}}},
+          {"name": "r", "static": true, "friction": 0.4,
+           "shape": {"half_plane": {"normal": [-1, 0], "offset": -0.2}}},
+          {"name": "b", "shape": {"box": {"size": [0.2, 0.4]}}, "mass": 1, "position": [0.1, 0],
+           "friction": 0.4}],
+        "forces": [{"name": "f", "body": "b", "force": [)" +
+          std::string(force) + R"(, 0], "end": 0.2}],
+        "simulation": {"dt": )" +
+          test_scenes::Text(dt) + R"(, "duration": 0.5}})");
+      EXPECT_NEAR(twist.second, -3.0, 1e-9) << dt << " " << force;
+    }
+  }
+  for (const double dt : {0.01, 0.001, 0.0002}) {
+    const std::string simulation =
+        R"("simulation": {"dt": )" + test_scenes::Text(dt) + R"(, "duration": 0.5}})";
+    const std::string wall =
+        R"("kinematic": true, "velocity": [0.3, 0.5], "friction": 0.3,
+            "shape": {"box": {"size": [1, 6]}})";
+    const auto driven =
+        twist_of_last(R"({"gravity": [0, 0], "bodies": [{"name": "l", "position": [-0.5, 0], )" +
+                      wall + R"(}, {"name": "r", "position": [0.7, 0], )" + wall +
+                      R"(}, {"name": "b", "shape": {"box": {"size": [0.2, 0.4]}}, "mass": 1,
+              "position": [0.1, 0], "velocity": [0.3, -0.5], "friction": 0.3}], )" +
+                      simulation);
+    EXPECT_NEAR(driven.second, -0.5, 1e-9) << dt;
+    for (const double tilt : {-2.0, 0.3}) {
+      const std::string c = test_scenes::Text(std::cos(tilt)),
+                        n = test_scenes::Text(std::sin(tilt));
+      const std::string minus_c = test_scenes::Text(-std::cos(tilt)),
+                        minus_n = test_scenes::Text(-std::sin(tilt));
+      const auto tilted = twist_of_last(
+          R"({"gravity": [0, 0], "bodies": [
+          {"name": "l", "static": true, "friction": 0.3,
+           "shape": {"half_plane": {"normal": [)" +
+          c + ", " + n + R"(], "offset": -0.1}}},
+          {"name": "r", "static": true, "friction": 0.3,
+           "shape": {"half_plane": {"normal": [)" +
+          minus_c + ", " + minus_n + R"(], "offset": -0.1}}},
+          {"name": "b", "shape": {"box": {"size": [0.2, 0.4]}}, "mass": 1, "position": [0, 0],
+           "angle": )" +
+          test_scenes::Text(tilt) + R"(, "velocity": [)" + minus_n + ", " + c +
+          R"(], "friction": 0.3}], )" + simulation);
+      EXPECT_NEAR(std::hypot(tilted.first, tilted.second), 1.0, 1e-9) << dt << " " << tilt;
     }
   }
 }
