@@ -276,12 +276,10 @@ class ProblemBuilder {
     if constexpr (kLevel == Level::kVelocity) {
       const bool is_gap = contact.law == ContactLaw::kGap && contact.IsOfShapes();
       if (is_gap) block.rounding = PositionRounding(state_, contact.a, contact.b) / at_.h;
-      // A gap that is the rounding of many steps is none: a body that just fits between two walls
-      // is in one of them by as much, and both rows would contradict each other.
-      constexpr double kOfSteps = 16.0 * kCoordinateRounding / kCornerRounding;
-      if (is_gap && std::abs(ValueOf(c_n)) <= kOfSteps * block.rounding) {
-        block.c_n -= T(ValueOf(c_n));
-      }
+      // Both rows of a body that just fits between two walls would contradict each other. The
+      // derivative of the gap stays.
+      const double none = kGapRounding / kCornerRounding * block.rounding;
+      if (is_gap && std::abs(ValueOf(c_n)) <= none) block.c_n -= T(ValueOf(c_n));
       block.c_n += PrescribedSpeed(s_, state_, contact.a, rows.normal_a, contact.b, rows.normal_b);
       block.c_t +=
           PrescribedSpeed(s_, state_, contact.a, rows.tangent_a, contact.b, rows.tangent_b);

@@ -21,6 +21,10 @@ inline constexpr double kTouchAngle = 1e-10;
 /// contact's row; smaller changes do not change its mode.
 inline constexpr double kCornerRounding = 4.0 * std::numeric_limits<double>::epsilon();
 
+/// Of the coordinates of two bodies: a gap that is smaller is the rounding of some thousand steps,
+/// and counts as 0: what just fits between two walls is in one of them by as much.
+inline constexpr double kGapRounding = 1024.0 * std::numeric_limits<double>::epsilon();
+
 /// Of the step: times that differ by less are the same, because an end of a step is k dt rounded.
 inline constexpr double kSameTime = 1e-9;
 /// Of the step: knots of a body's path that are nearer to the end of a step fall on it.

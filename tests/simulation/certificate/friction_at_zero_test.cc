@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Friction that is 0, of every kind there is: below it there is no law, so that a derivative with
-// respect to it has one side, which the certificate of every method says.
+// respect to it has one side, which the certificate of every method says. And the restitution of a
+// limit that is 0, above which there is another law.
 #include <gtest/gtest.h>
 
 #include <cmath>
