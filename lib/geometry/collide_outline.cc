@@ -112,27 +112,11 @@ class OutlinePair {
            });
   }
 
-  /// Whether a vertex of B is over the run; just behind it and beside its end it is, however near
-  /// the next run is, where it does not face that one: the corner of a body that rocks on a face of
-  /// its own width.
   bool IsOverRun(int vertex, const Vector2<double>& x) const {
-    if (outline_.IsOver(run_, x)) return true;
-    if (is_ellipse_ || other_.Size() < 2) return false;
-    const int beside = NearerRun(x);
-    return beside >= 0 && !FacesRun(vertex, outline_.run(beside).normal);
-  }
-  /// The run at a convex joint that a point over this one, a little behind both, is nearer to; −1:
-  /// none, and where neighbours hide a part of the outline.
-  int NearerRun(const Vector2<double>& x) const {
-    const double s = of_.tangent.dot(x - of_.start);
-    const double depth = -HeightOf(x);
-    const bool is_shallow = depth > 0.0 && depth <= kBehindFace * of_.length;
-    if (!is_shallow || s < 0.0 || s > of_.length || outline_.HasSeams()) return -1;
-    const bool is_after = outline_.IsAfterStart(run_, x);
-    if (is_after == outline_.IsBeforeEnd(run_, x)) return -1;
-    const OutlineJoint joint = is_after ? of_.after : of_.before;
-    if (joint != OutlineJoint::kConvex) return -1;
-    return is_after ? outline_.Next(run_) : outline_.Previous(run_);
+    const bool is_corner = !is_ellipse_ && other_.Size() > 1;
+    return IsOverOrBehind(outline_, run_, x, [&](const Vector2<double>& normal) {
+      return !is_corner || FacesRun(vertex, normal);
+    });
   }
 
   void AddOnRun(int vertex, double height) {
@@ -146,9 +130,10 @@ class OutlinePair {
     const SeamVertex* const bound = outline_.BoundedStart(run_);
     if (bound != nullptr && !bound->is_open) return;
     const int previous = of_.before == OutlineJoint::kConvex ? outline_.Previous(run_) : -1;
-    const NormalCone cone = BoundedCone(
-        {previous >= 0 ? outline_.run(previous).normal : Vector2<double>(-of_.tangent), of_.normal},
-        bound);
+    const NormalCone cone =
+        BoundedCone({previous >= 0 ? outline_.run(previous).normal : Vector2<double>(-of_.tangent),
+                     of_.normal, false, previous >= 0},
+                    bound);
     Try(of_.first, of_.start, cone, 0.0, [&](const Vector2<double>& x) {
       const bool is_beyond = of_.tangent.dot(x - of_.start) < 0.0 && HeightOf(x) >= 0.0;
       return !outline_.IsAfterStart(run_, x) &&
@@ -160,8 +145,8 @@ class OutlinePair {
     const SeamVertex* const bound = outline_.BoundedEnd(run_);
     if (bound != nullptr && !bound->is_open) return;
     const Vector2<double> end = outline_.EndPlace(run_);
-    Try(of_.last + 1, end, BoundedCone({of_.normal, of_.tangent}, bound), of_.length,
-        [&](const Vector2<double>& x) {
+    Try(of_.last + 1, end, BoundedCone({of_.normal, of_.tangent, false, true, false}, bound),
+        of_.length, [&](const Vector2<double>& x) {
           return !outline_.IsBeforeEnd(run_, x) && HeightOf(x) >= 0.0;
         });
   }
@@ -202,7 +187,7 @@ class OutlinePair {
         height = own;
         edge = i;
       }
-      if (own > of_allowed && IsAllowed(cone, line) && IsOverFace(i, line, v)) {
+      if (own > of_allowed && cone.Faces(-line.Normal()) && IsOverFace(i, line, v)) {
         of_allowed = own;
         allowed = i;
       }
@@ -218,12 +203,6 @@ class OutlinePair {
     return true;
   }
 
-  // The second contact of faces that are nearly parallel counts too.
-  bool IsAllowed(const NormalCone& cone, const CoreEdge& line) const {
-    const Vector2<double> direction = -line.Normal();
-    const bool is_corner = outline_.IsPolygon() || of_.before == OutlineJoint::kConvex;
-    return is_corner ? cone.Faces(direction) : cone.Contains(direction);
-  }
   bool IsOverFace(int edge, const CoreEdge& line, const Vector2<double>& v) const {
     const double s = line.tangent.dot(v - line.start);
     const auto room = [&](int vertex) {
@@ -283,6 +262,20 @@ class OutlinePair {
 };
 
 }  // namespace
+
+int NearerRun(const Outline& outline, int run, const Vector2<double>& x) {
+  const OutlineRun& of = outline.run(run);
+  const double s = of.tangent.dot(x - of.start);
+  const double depth = -of.normal.dot(x - of.start);
+  const bool is_shallow = depth > 0.0 && depth <= kBehindFace * of.length;
+  if (!is_shallow || s < 0.0 || s > of.length || outline.HasSeams()) return -1;
+  const bool is_after = outline.IsAfterStart(run, x);
+  if (is_after == outline.IsBeforeEnd(run, x)) return -1;
+  const OutlineJoint joint = is_after ? of.after : of.before;
+  if (joint != OutlineJoint::kConvex) return -1;
+  return is_after ? outline.Next(run) : outline.Previous(run);
+}
+
 }  // namespace tangible::internal
 
 namespace tangible {

@@ -16,6 +16,8 @@ namespace tangible::internal {
 struct NormalCone {
   Vector2<double> first, last;
   bool is_bounded = false;  ///< by a neighbour at whose seam the corner is
+  /// Whether edges have these normals: not the line's end at an open end.
+  bool has_first = true, has_last = true;
   bool Contains(const Vector2<double>& direction) const {
     return Cross(first, direction) >= -kFlushTurn && Cross(direction, last) >= -kFlushTurn &&
            direction.dot(first + last) > 0.0;
@@ -23,8 +25,8 @@ struct NormalCone {
   /// Whether a face whose outward normal is −`direction` may come to lie on one of the corner's
   /// edges: its contact with the corner is the second one of two faces that are nearly parallel.
   bool Faces(const Vector2<double>& direction) const {
-    return Contains(direction) ||
-           (!is_bounded && (direction.dot(first) > kFacing || direction.dot(last) > kFacing));
+    return Contains(direction) || (!is_bounded && ((has_first && direction.dot(first) > kFacing) ||
+                                                   (has_last && direction.dot(last) > kFacing)));
   }
 };
 
@@ -43,6 +45,20 @@ inline Pose<double> RelativeTo(const Pose<double>& frame, const Pose<double>& po
   relative.rotation.sine =
       frame.rotation.cosine * pose.rotation.sine - frame.rotation.sine * pose.rotation.cosine;
   return relative;
+}
+
+/// The run at a convex joint that a point over another one, a little behind both, is nearer to; −1:
+/// none, and where neighbours hide a part of the outline.
+int NearerRun(const Outline& outline, int run, const Vector2<double>& x);
+
+/// Whether a corner at x is over a run. Just behind it and beside its end it is, however near the
+/// next run is, where it does not face that one: the corner of a body that rocks on a face of its
+/// own width. `faces` says whether the corner faces a run with a given normal.
+template <typename Faces>
+bool IsOverOrBehind(const Outline& outline, int run, const Vector2<double>& x, const Faces& faces) {
+  if (outline.IsOver(run, x)) return true;
+  const int beside = NearerRun(outline, run, x);
+  return beside >= 0 && !faces(outline.run(beside).normal);
 }
 
 inline double DistanceOfSegment(const Vector2<double>& start, const Vector2<double>& end,

@@ -41,7 +41,7 @@ RunCorner StartOf(const Outline& outline, int run) {
   const OutlineRun& of = outline.run(run);
   const int before = of.before == OutlineJoint::kEnd ? -1 : outline.Previous(run);
   const NormalCone cone{before >= 0 ? outline.run(before).normal : Vector2<double>(-of.tangent),
-                        of.normal};
+                        of.normal, false, before >= 0};
   return {of.first, of.start, BoundedCone(cone, outline.BoundedStart(run)), before, run};
 }
 
@@ -49,7 +49,8 @@ RunCorner EndCornerOf(const Outline& outline, int run) {
   const OutlineRun& of = outline.run(run);
   const int after = of.after == OutlineJoint::kEnd ? -1 : outline.Next(run);
   return {outline.EndOf(run), outline.EndPlace(run),
-          BoundedCone({of.normal, after >= 0 ? outline.run(after).normal : of.tangent},
+          BoundedCone({of.normal, after >= 0 ? outline.run(after).normal : of.tangent, false, true,
+                       after >= 0},
                       outline.BoundedEnd(run)),
           run, after};
 }
@@ -94,9 +95,11 @@ struct View {
 
 /// Whether a corner is a contact with a run of the other outline.
 bool IsOverRun(const View& view, const RunCorner& corner, int run) {
-  const Vector2<double> direction = -view.other.run(run).normal;
-  return corner.cone.Faces(view.DirectionToOwn(direction)) &&
-         view.other.IsOver(run, view.ToOther(corner.place));
+  const auto faces = [&](const Vector2<double>& normal) {
+    return corner.cone.Faces(view.DirectionToOwn(Vector2<double>(-normal)));
+  };
+  return faces(view.other.run(run).normal) &&
+         IsOverOrBehind(view.other, run, view.ToOther(corner.place), faces);
 }
 
 /// Whether a corner over a run is above a corner of it that is a contact with one of the edges that

@@ -230,19 +230,23 @@ void RolloutCertifier::AddCoefficients(const StepRecord& record, const Place& pl
   }
 }
 
-void RolloutCertifier::AddLinearSystem(const StepRecord& record, ContactSystem* system) {
+void RolloutCertifier::AddLinearSystem(const Model<double>& model, const StepRecord& record,
+                                       ContactSystem* system) {
   const std::vector<ContactMode>& modes = record.solution.modes;
-  const size_t unknowns = 3 * static_cast<size_t>(system->num_blocks());
-  if (unknowns <= kRankEachStep || modes != last_modes_) {
-    last_redundant_ = CountRedundantRows(record.problem, modes);
-    if (last_redundant_ > 0 && CountUndeterminedMotions(record.problem, modes) > 0) {
-      OneSided(kUndeterminedMotion);
+  // What rests has the system of the step before.
+  if (!last_.Repeats(model, record)) {
+    const size_t unknowns = 3 * static_cast<size_t>(system->num_blocks());
+    if (unknowns <= kRankEachStep || modes != last_.modes) {
+      last_redundant_ = CountRedundantRows(record.problem, modes);
+      if (last_redundant_ > 0) {
+        AddRedundancy(*model.structure, record.problem, modes, record.friction);
+      }
     }
+    const SystemQuality quality = MeasureSystem(record.problem, modes, system);
+    certificate_.condition = std::max(certificate_.condition, quality.condition);
+    certificate_.linear_residual = std::max(certificate_.linear_residual, quality.residual);
   }
   certificate_.redundant_rows += last_redundant_;
-  const SystemQuality quality = MeasureSystem(record.problem, modes, system);
-  certificate_.condition = std::max(certificate_.condition, quality.condition);
-  certificate_.linear_residual = std::max(certificate_.linear_residual, quality.residual);
 }
 
 // Each pair of shapes is examined once; its contacts are adjacent in the list. In an impact these
@@ -426,8 +430,7 @@ void RolloutCertifier::AddStep(const Model<double>& model, long step, Stepper* s
       continue;
     }
     closed.push_back(contact);
-    const bool held = std::any_of(closed_.begin(), closed_.end(),
-                                  [&](const ActiveContact& last) { return last.SameAs(contact); });
+    const bool held = Has(closed_, contact);
     if (!held && contact.law == ContactLaw::kGap && contact.gap > 0.0 &&
         ApproachOf(s, record, i).before < -s.settings.restitution_threshold) {
       landing_ =
@@ -440,9 +443,9 @@ void RolloutCertifier::AddStep(const Model<double>& model, long step, Stepper* s
   certificate_.degenerate_rows += static_cast<int>(degenerate.size());
   AddServos(model, step, record);
   AddSupports(model, step, record);
-  AddLinearSystem(record, &stepper->system());
+  AddLinearSystem(model, record, &stepper->system());
   AddFeatures(model, record, step, &stepper->system());
-  last_modes_ = record.solution.modes;
+  last_.Keep(model, record);
 }
 
 void RolloutCertifier::AddForceWindows(const Model<double>& model) {
@@ -629,24 +632,6 @@ std::vector<int> NumbersOf(const ModelStructure& structure, const RowMatrixXd& d
   return numbers;
 }
 
-// How far the directions contradict redundant rows (StepTangent::ApplyAndMeasure).
-double MeasureContradiction(const Model<double>& model, const State<double>& initial,
-                            RowMatrixXd directions) {
-  StepTangent tangent;
-  double worst = 0.0;
-  State<double> final;
-  Rollout(
-      model, initial,
-      [&](long, double, const State<double>&, Stepper* stepper) {
-        if (stepper != nullptr) {
-          const double measured = tangent.ApplyAndMeasure(model, stepper, &directions);
-          worst = measured <= worst ? worst : measured;
-        }
-      },
-      &final);
-  return worst;
-}
-
 // Whether the run has one derivative along each direction, by fixed steps: those along and against
 // it, which are exact, and the tangent, in the modes that were found, are the same after each step.
 // Then nothing at a kink moves, or whatever moves has the same rates on both sides.
@@ -716,25 +701,25 @@ Certificate CertifyDerivative(const Model<double>& model, const State<double>& i
       HasOneDerivative(model, initial, directions, sizes)) {
     certifier.LeaveOutKinks(&certificate);
   }
-  // Beside far lighter bodies what an impact drives is large without a contradiction.
-  const bool may_measure =
-      model.structure->settings.stepping == Stepping::kFixed || !HasWideMasses(model);
-  if (certificate.redundant_rows > 0 && certificate.one_sided.empty() && may_measure &&
-      !(MeasureContradiction(model, initial, directions) < kMostExceeded)) {
-    certificate.one_sided = kContradictingRows;
-    SetVerdict(certificate);
-  }
   // Residuals of single solves do not show the digits that an ill-conditioned sequence of them
   // loses, nor how successive impacts multiply rounding.
   constexpr double kIllConditioned = 1e8;
   constexpr long kManyEvents = 10;
-  // Where a direction contradicts redundant rows no derivative exists that could be compared.
-  const bool compare = HasWideMasses(model) || certificate.condition > kIllConditioned ||
-                       certificate.redundant_rows > 0 || certificate.events >= kManyEvents;
-  if (compare && certificate.one_sided != kContradictingRows &&
-      report.status == StepStatus::kDone) {
-    certificate.linear_residual =
-        std::max(certificate.linear_residual, DualityGap(model, initial, directions, sizes));
+  if (!HasWideMasses(model) && !(certificate.condition > kIllConditioned) &&
+      certificate.redundant_rows == 0 && certificate.events < kManyEvents) {
+    return certificate;
+  }
+  DualityTest test(model, initial, directions);
+  // Beside far lighter bodies what an impact drives is large without a contradiction.
+  const bool may_measure =
+      model.structure->settings.stepping == Stepping::kFixed || !HasWideMasses(model);
+  if (certificate.redundant_rows > 0 && certificate.one_sided.empty() && may_measure &&
+      !(test.contradiction() < kMostExceeded)) {
+    // Then no derivative exists that could be compared.
+    certificate.one_sided = kContradictingRows;
+    SetVerdict(certificate);
+  } else if (report.status == StepStatus::kDone) {
+    certificate.linear_residual = std::max(certificate.linear_residual, test.Gap(sizes));
     SetVerdict(certificate);
   }
   return certificate;

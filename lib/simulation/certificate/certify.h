@@ -133,8 +133,12 @@ class RolloutCertifier {
   void AddLimitsAtRelease(const Model<double>& model, long step, const Segment& segment);
   void AddClosedAtOnce(const Model<double>& model, long step, const Segment& segment);
   void AddTwoLimits(const Model<double>& model, long step, const Segment& segment);
-  void AddQuality(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes,
-                  ContactSystem* system);
+  void AddQuality(const ModelStructure& s, const ContactProblem<double>& problem,
+                  const std::vector<ContactMode>& modes,
+                  const std::vector<CoefficientSource>& friction, ContactSystem* system);
+  void AddRedundancy(const ModelStructure& s, const ContactProblem<double>& problem,
+                     const std::vector<ContactMode>& modes,
+                     const std::vector<CoefficientSource>& friction);
   void AddUnloaded(const Model<double>& model, long step, const Impulses& impact);
   bool StaysUnloaded(const Model<double>& model, const Impulses& impact, size_t i) const;
   void AddSimultaneous(const Model<double>& model, long step, const Impulses& impact);
@@ -149,7 +153,7 @@ class RolloutCertifier {
   void AddCoefficients(const StepRecord& record, const Place& place);
   void AddFeatures(const Model<double>& model, const StepRecord& record, long step,
                    ContactSystem* system);
-  void AddLinearSystem(const StepRecord& record, ContactSystem* system);
+  void AddLinearSystem(const Model<double>& model, const StepRecord& record, ContactSystem* system);
   void AddForceWindows(const Model<double>& model);
   void AddReleases(const Model<double>& model);
   void AddPaths(const Model<double>& model);
@@ -174,7 +178,27 @@ class RolloutCertifier {
   std::string landing_;                ///< of the last step; empty if nothing landed in it
   std::string spring_turns_;           ///< of the first; empty: none
   std::vector<ActiveContact> closed_;  ///< of the last step, or segment
-  std::vector<ContactMode> last_modes_;
+  /// What the system of the last fixed step depends on.
+  struct LastSystem {
+    std::vector<ContactMode> modes;
+    std::vector<double> parameters, pose, twist;
+    size_t dampers = 0;
+    double h = 0.0;
+    bool Repeats(const Model<double>& model, const StepRecord& record) const {
+      return record.solution.modes == modes && record.h == h &&
+             record.problem.dampers.size() == dampers && record.before.pose == pose &&
+             record.before.twist == twist && model.parameters == parameters;
+    }
+    void Keep(const Model<double>& model, const StepRecord& record) {
+      modes = record.solution.modes;
+      parameters = model.parameters;
+      pose = record.before.pose;
+      twist = record.before.twist;
+      dampers = record.problem.dampers.size();
+      h = record.h;
+    }
+  };
+  LastSystem last_;
   int last_redundant_ = 0;
   // For event stepping: contacts that carry a force, the bodies that the last impact moved, and
   // when.
@@ -232,6 +256,11 @@ inline constexpr char kContradictingRows[] =
 /// The reason where redundant contacts leave a motion undetermined (contact_conditioning.h).
 inline constexpr char kUndeterminedMotion[] =
     "redundant contacts that slide with different friction leave the motion undetermined";
+
+/// The reason where they leave the derivative by the friction of some of them undetermined.
+inline constexpr char kUndeterminedFriction[] =
+    "redundant contacts share their load in many ways, so that the derivative by the friction of "
+    "some of them is undetermined";
 
 /// The certificate of the derivatives along `directions` (num_variables x columns, named; `sizes`
 /// as in DualityGap). Contacts at a kink that no direction moves are left out: by fixed steps,

@@ -91,13 +91,13 @@ bool StartsToSlide(const Model<double>& model, const Segment& segment, size_t co
 
 }  // namespace
 
-void RolloutCertifier::AddQuality(const ContactProblem<double>& problem,
-                                  const std::vector<ContactMode>& modes, ContactSystem* system) {
+void RolloutCertifier::AddQuality(const ModelStructure& s, const ContactProblem<double>& problem,
+                                  const std::vector<ContactMode>& modes,
+                                  const std::vector<CoefficientSource>& friction,
+                                  ContactSystem* system) {
   const int redundant = CountRedundantRows(problem, modes);
   certificate_.redundant_rows += redundant;
-  if (redundant > 0 && CountUndeterminedMotions(problem, modes) > 0) {
-    OneSided(kUndeterminedMotion);
-  }
+  if (redundant > 0) AddRedundancy(s, problem, modes, friction);
   const SystemQuality quality = MeasureSystem(problem, modes, system);
   certificate_.condition = std::max(certificate_.condition, quality.condition);
   certificate_.linear_residual = std::max(certificate_.linear_residual, quality.residual);
@@ -148,7 +148,7 @@ void RolloutCertifier::AddImpact(const Model<double>& model, long step, Impulses
     AddUnloaded(model, step, *impact);
     AddFeatures(model, *impact, step, &impact->system);
   }
-  AddQuality(impact->problem, impact->solution.modes, &impact->system);
+  AddQuality(s, impact->problem, impact->solution.modes, impact->friction, &impact->system);
 }
 
 // Coupled bodies that stop sliding at the same time: the derivative of the time is that of only one
@@ -255,9 +255,7 @@ void RolloutCertifier::AddBesideJumps(const Model<double>& model, const Segment&
       const ActiveContact& other = segment.contacts[i];
       if (!other.SameAs(contact)) continue;
       if (SlidingSign(segment.modes[i]) != 0.0 && !beside.is_touch) return false;
-      return other.IsPureFriction() ||
-             std::any_of(loaded_.begin(), loaded_.end(),
-                         [&](const ActiveContact& one) { return one.SameAs(contact); });
+      return other.IsPureFriction() || Has(loaded_, contact);
     }
     return false;
   };
@@ -456,7 +454,7 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
   }
   AddLimitsAtRelease(model, step, *segment);
   AddEventOf(model, step, derivative, segment);
-  AddQuality(start.problem, segment->modes, &start.system);
+  AddQuality(*model.structure, start.problem, segment->modes, segment->friction, &start.system);
 }
 
 // An event on the end of a step: beside it, it splits the motion before that end or the one behind
@@ -526,8 +524,7 @@ void RolloutCertifier::AddLimitsAtRelease(const Model<double>& model, long step,
 void RolloutCertifier::AddTouchBehind(const Model<double>& model, long step, const Segment& last,
                                       const ActiveContact& contact, const std::string& what) {
   const ModelStructure& s = *model.structure;
-  const bool is_closed = std::any_of(last.contacts.begin(), last.contacts.end(),
-                                     [&](const ActiveContact& c) { return c.SameAs(contact); });
+  const bool is_closed = Has(last.contacts, contact);
   const ContactSpeeds speeds = SpeedsOf(model, last.after, contact);
   const double speed = speeds.normal;
   // What slides along a face that it touches approaches it by rounding.

@@ -54,11 +54,6 @@ bool Closed(const Segment& segment, const ActiveContact& contact) {
       });
 }
 
-bool Has(const std::vector<ActiveContact>& contacts, const ActiveContact& contact) {
-  return std::any_of(contacts.begin(), contacts.end(),
-                     [&](const ActiveContact& other) { return other.SameAs(contact); });
-}
-
 // Whether the contact has a gap: shapes, or a joint and its limit.
 bool HasGap(const ActiveContact& contact) {
   return contact.IsOfShapes() || !contact.IsPureFriction();

@@ -27,6 +27,11 @@ inline double Negligible(const Model<double>& model, double speed) {
                                                                       model.parameters[kGravityY]));
 }
 
+inline bool Has(const std::vector<ActiveContact>& contacts, const ActiveContact& contact) {
+  return std::any_of(contacts.begin(), contacts.end(),
+                     [&](const ActiveContact& other) { return other.SameAs(contact); });
+}
+
 // Whether one of the contacts is between the shapes of the same two bodies.
 inline bool HasPair(const std::vector<ActiveContact>& contacts, const ActiveContact& contact) {
   return std::any_of(contacts.begin(), contacts.end(), [&](const ActiveContact& other) {

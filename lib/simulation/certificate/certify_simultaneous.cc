@@ -174,8 +174,7 @@ void RolloutCertifier::AddUnloaded(const Model<double>& model, long step, const 
     const ActiveContact& c = impact.contacts[i];
     if (c.is_rolling) continue;
     const double before = speed(i);
-    const bool loaded = std::any_of(loaded_.begin(), loaded_.end(),
-                                    [&](const ActiveContact& l) { return l.SameAs(c); });
+    const bool loaded = Has(loaded_, c);
     if (!loaded && impact.solution.normal_impulse[i] > kLoaded * largest &&
         before >= -Negligible(model, before)) {
       const Place place{model.structure.get(), step, impact.time, i, &c, impact.solution.modes[i]};
@@ -193,8 +192,7 @@ bool RolloutCertifier::StaysUnloaded(const Model<double>& model, const Impulses&
   const ContactBlock<double>& block = impact.problem.contacts[i];
   const double speed =
       RelativeSpeed(impact.before, contact.a, block.normal_a, contact.b, block.normal_b);
-  const bool is_loaded = std::any_of(loaded_.begin(), loaded_.end(),
-                                     [&](const ActiveContact& l) { return l.SameAs(contact); });
+  const bool is_loaded = Has(loaded_, contact);
   if (!is_loaded || speed < -Negligible(model, speed)) return false;
   double largest = 0.0;
   for (const double normal : impact.solution.normal_impulse) {
@@ -217,8 +215,7 @@ void RolloutCertifier::AddClosedAtOnce(const Model<double>& model, long step,
   std::vector<size_t> begun;
   for (size_t i = 0; i < segment.contacts.size(); ++i) {
     const ActiveContact& contact = segment.contacts[i];
-    const bool is_loaded = std::any_of(loaded_.begin(), loaded_.end(),
-                                       [&](const auto& l) { return l.SameAs(contact); });
+    const bool is_loaded = Has(loaded_, contact);
     if (!contact.IsOfShapes() || !is_loaded || HasPair(closed_, contact)) {
       continue;
     }

@@ -178,6 +178,13 @@ void RolloutCertifier::AddStart(const Model<double>& model, const EventRecord& r
       reach = std::max(reach, search.lengths().Touch(*start, body, body));
     }
     search.FindContacts(model, *start, reach, &unloaded);
+    const size_t shapes = unloaded.size();
+    AppendLimits(model, *start, &unloaded);
+    for (size_t k = shapes; k < unloaded.size(); ++k) {
+      ContactRows<double> rows;
+      EvaluateActiveRows(model, *start, unloaded[k], &rows);
+      unloaded[k].gap = rows.geometry.gap;
+    }
   }
   for (const ActiveContact& contact : unloaded) {
     if (contact.gap <= search.TouchTolerance(model, *start, contact) &&
@@ -200,7 +207,8 @@ void RolloutCertifier::AddStart(const Model<double>& model, const EventRecord& r
     // for by the landing; not so where no force presses.
     const bool rests = Rests(model, *start, *contact);
     const double meant = kMeantTouches * search.TouchTolerance(model, *start, *contact);
-    const bool pushed = rests && (k >= loaded || contact->gap < -meant);
+    const bool opens = k >= loaded || (first != nullptr && !Has(first->contacts, *contact));
+    const bool pushed = rests && (opens || contact->gap < -meant);
     if (k >= loaded && !rests) {
       continue;
     }
@@ -281,9 +289,7 @@ void RolloutCertifier::ProbeStarts(const Model<double>& model, const State<doubl
                                    const Segment* first) {
   std::vector<ActiveContact> resting;
   for (const ActiveContact* contact : touching) {
-    const bool is_new = std::none_of(resting.begin(), resting.end(),
-                                     [&](const auto& other) { return other.SameAs(*contact); });
-    if (contact->IsOfShapes() && is_new && Rests(model, start, *contact)) {
+    if (contact->IsOfShapes() && !Has(resting, *contact) && Rests(model, start, *contact)) {
       resting.push_back(*contact);
     }
   }
@@ -295,9 +301,7 @@ void RolloutCertifier::ProbeStarts(const Model<double>& model, const State<doubl
     for (const ActiveContact& contact : resting) {
       std::vector<JacobianEntry> approach, slip;
       const bool brakes = BrakesMoreAsItLands(model, start, contact);
-      if (brakes || std::any_of(may_jam.begin(), may_jam.end(), [&](const ActiveContact& other) {
-            return other.SameAs(contact);
-          })) {
+      if (brakes || Has(may_jam, contact)) {
         AddApproachGradient(model, start, contact, &scratch, &approach);
       }
       if (brakes && Moves(approach, Directions(), c)) {

@@ -8,29 +8,18 @@
 
 #include "tangible/dynamics/assembly/assembly.h"
 #include "tangible/simulation/certificate/tolerances.h"
-#include "tangible/simulation/derivatives/rollout_adjoint.h"
 #include "tangible/simulation/derivatives/rollout_tangent.h"
 
 namespace tangible {
-namespace {
-
-double GyrationRadius(const Model<double>& model, int body) {
-  const BodyIndex& index = model.structure->bodies[body];
-  return std::sqrt(model.parameters[index.inertia] / model.parameters[index.mass]);
-}
-
-// Largest magnitudes of poses and twists, angles at the radius of gyration.
-struct Extent {
-  double pose = 0.0;   // m
-  double twist = 0.0;  // m/s
-};
+namespace internal {
 
 // The largest entries of the state, and of its derivative along each direction, during a run.
 class RunExtents {
  public:
   RunExtents(const Model<double>& model, Eigen::Index columns) : model_(model), columns_(columns) {
     for (const int body : model.structure->moving) {
-      radius_.push_back(GyrationRadius(model, body));
+      const BodyIndex& index = model.structure->bodies[body];
+      radius_.push_back(std::sqrt(model.parameters[index.inertia] / model.parameters[index.mass]));
     }
   }
   void Add(long k, double t, const State<double>& state, const RowMatrixXd& w_dot);
@@ -40,9 +29,15 @@ class RunExtents {
     return pose ? std::max(change.pose, state_.pose / size)
                 : std::max(change.twist, state_.twist / size);
   }
+  /// Of gyration, of a moving block.
   double radius(size_t block) const { return radius_[block]; }
 
  private:
+  // Largest magnitudes of poses and twists, angles at the radius of gyration.
+  struct Extent {
+    double pose = 0.0;   // m
+    double twist = 0.0;  // m/s
+  };
   const Model<double>& model_;
   std::vector<double> radius_;  // of moving blocks
   Extent state_;
@@ -79,6 +74,10 @@ void RunExtents::Add(long k, double t, const State<double>& state, const RowMatr
   }
 }
 
+}  // namespace internal
+
+namespace {
+
 // The outputs that are compared, and the right-hand sides of (1).
 struct Comparison {
   std::vector<int> variables;  // of outputs, among [poses | twists]
@@ -86,8 +85,8 @@ struct Comparison {
   RowMatrixXd allowed;         // |b| + kStateRounding S, likewise
 };
 
-Comparison Compare(const ModelStructure& s, const RunExtents& extents, const RowMatrixXd& w_dot,
-                   const std::vector<double>& sizes) {
+Comparison Compare(const ModelStructure& s, const internal::RunExtents& extents,
+                   const RowMatrixXd& w_dot, const std::vector<double>& sizes) {
   Comparison comparison;
   for (const bool pose : {true, false}) {
     for (const int body : s.moving) {
@@ -205,36 +204,48 @@ RowMatrixXd WeightsOf(const Comparison& comparison) {
 
 }  // namespace
 
-double DualityGap(const Model<double>& model, const State<double>& initial,
-                  const RowMatrixXd& directions, const std::vector<double>& sizes) {
-  const ModelStructure& s = *model.structure;
-  if (directions.cols() == 0 || s.moving.empty()) {
-    return 0.0;
-  }
-  RowMatrixXd w_dot = directions;
+DualityTest::DualityTest(const Model<double>& model, const State<double>& initial,
+                         const RowMatrixXd& directions)
+    : model_(model),
+      directions_(directions),
+      w_dot_(directions),
+      extents_(std::make_unique<internal::RunExtents>(model, directions.cols())) {
+  StepTangent tangent;
+  tangent.FixNumbers(*model.structure, w_dot_);
   State<double> final;
-  RunExtents extents(model, directions.cols());
-  const auto add = [&](long k, double t, const State<double>& state, const RowMatrixXd& dot) {
-    extents.Add(k, t, state, dot);
-  };
-  if (RolloutTangent(model, initial, add, &w_dot, &final).status != StepStatus::kDone) {
-    return HUGE_VAL;
-  }
-  const Comparison comparison = Compare(s, extents, w_dot, sizes);
+  status_ = tape_
+                .Record(
+                    model, initial, Factorisations::kKeep,
+                    [&](long k, double t, const State<double>& state, Stepper* stepper) {
+                      if (stepper != nullptr) {
+                        const double measured = tangent.ApplyAndMeasure(model, stepper, &w_dot_);
+                        contradiction_ = measured <= contradiction_ ? contradiction_ : measured;
+                      }
+                      extents_->Add(k, t, state, w_dot_);
+                    },
+                    &final)
+                .status;
+}
+
+DualityTest::~DualityTest() = default;
+
+double DualityTest::Gap(const std::vector<double>& sizes) {
+  const ModelStructure& s = *model_.structure;
+  if (directions_.cols() == 0 || s.moving.empty()) return 0.0;
+  if (status_ != StepStatus::kDone) return HUGE_VAL;
+  const Comparison comparison = Compare(s, *extents_, w_dot_, sizes);
   const RowMatrixXd weights = WeightsOf(comparison);
-  RolloutTape tape;
-  tape.Record(model, initial, Factorisations::kKeep, {}, &final);
-  const long last = tape.steps();
+  const long last = tape_.steps();
   RowMatrixXd w_bar;
-  tape.Adjoint(
-      model, static_cast<int>(weights.cols()),
+  tape_.Adjoint(
+      model_, static_cast<int>(weights.cols()),
       [&](long k, RowMatrixXd* w) {
         for (size_t i = 0; k == last && i < comparison.variables.size(); ++i) {
           w->row(comparison.variables[i]) += weights.row(static_cast<Eigen::Index>(i));
         }
       },
       &w_bar);
-  const RowMatrixXd by_adjoint = w_bar.transpose() * directions;
+  const RowMatrixXd by_adjoint = w_bar.transpose() * directions_;
   const RowMatrixXd by_tangent = weights.transpose() * comparison.by_tangent;
   const RowMatrixXd allowed =
       (weights.cwiseAbs2().transpose() * comparison.allowed.cwiseAbs2()).cwiseSqrt();
@@ -250,6 +261,11 @@ double DualityGap(const Model<double>& model, const State<double>& initial,
   }
   // Where no digit of an entry is right the size of the error does not matter.
   return std::isfinite(worst) ? std::min(worst, 1.0) : HUGE_VAL;
+}
+
+double DualityGap(const Model<double>& model, const State<double>& initial,
+                  const RowMatrixXd& directions, const std::vector<double>& sizes) {
+  return DualityTest(model, initial, directions).Gap(sizes);
 }
 
 bool HasWideMasses(const Model<double>& model) {

@@ -29,16 +29,44 @@
 // direction, with weights 1 / (|b| + 1e-4 S) and alternating signs. The denominator of (1) is then
 // the root of the sum of squares.
 
-#include "tangible/simulation/stepping/rollout.h"
+#include <memory>
+
+#include "tangible/simulation/derivatives/rollout_adjoint.h"
 
 namespace tangible {
 
+namespace internal {
+class RunExtents;
+}
+
 inline constexpr int kMostDualityColumns = 64;
 
-/// The largest gap (1), at most 1, over outputs and directions (num_variables x columns); `sizes`:
-/// how large each direction's parameter is, > 0, in its own unit; empty: 1 each. Infinite where the
-/// rollout fails or a derivative is not finite; 0 without directions. Cost: a tangent, and an
-/// adjoint of up to kMostDualityColumns columns.
+/// A run with its tangent along directions (num_variables x columns) and its tape.
+class DualityTest {
+ public:
+  DualityTest(const Model<double>& model, const State<double>& initial,
+              const RowMatrixXd& directions);
+  ~DualityTest();
+  /// How far the directions contradict redundant rows, up to where the run ends or fails
+  /// (StepTangent::ApplyAndMeasure).
+  double contradiction() const { return contradiction_; }
+  /// The largest gap (1), at most 1, over outputs and directions; `sizes`: how large each
+  /// direction's parameter is, > 0, in its own unit; empty: 1 each. Infinite where the run fails or
+  /// a derivative is not finite; 0 without directions. Cost: an adjoint of up to
+  /// kMostDualityColumns columns.
+  double Gap(const std::vector<double>& sizes = {});
+
+ private:
+  const Model<double>& model_;
+  const RowMatrixXd& directions_;
+  RowMatrixXd w_dot_;
+  std::unique_ptr<internal::RunExtents> extents_;
+  RolloutTape tape_;
+  StepStatus status_ = StepStatus::kDone;
+  double contradiction_ = 0.0;
+};
+
+/// DualityTest::Gap of a run.
 double DualityGap(const Model<double>& model, const State<double>& initial,
                   const RowMatrixXd& directions, const std::vector<double>& sizes = {});
 

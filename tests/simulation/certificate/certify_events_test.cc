@@ -281,6 +281,38 @@ TEST(CertifyEventsTest, ALimitAtTheStartIsOneSidedToo) {
   EXPECT_EQ(CertificateFor(arm, {"bodies/arm/mass"}).verdict, "trustworthy");
 }
 
+// What a load takes away from a limit, or from a contact whose load begins at 0 and grows, opens at
+// once: a speed against it is stopped, one along with the load is not.
+TEST(CertifyEventsTest, WhatOpensAtTheStartIsOneSidedForItsSpeed) {
+  const auto cart = [](const std::string& load) {
+    return load + R"(, "bodies": [{"name": "cart", "mass": 1, "inertia": 1, "position": [0, 0]}],
+        "joints": [{"name": "rail", "type": "prismatic", "bodies": ["cart", "world"],
+        "anchor": [0, 0], "axis": [1, 0], "limits": [0, 9]}])";
+  };
+  const std::string grows =
+      R"("force": {"time": [0, 4], "x": [0, 40], "y": [0, 40], "interpolation": "linear"}}])";
+  const std::string ball = R"("gravity": [0, 0], "bodies": [{"name": "ball", "mass": 1,
+      "shape": {"circle": {"radius": 0.25}}, "position": [0, 0.25]}, )" +
+                           Floor() + R"(], "forces": [{"name": "f", "body": "ball", )" + grows;
+  struct Case {
+    std::string scene;
+    const char* speed;
+    const char* load;
+    const char* reason;
+  };
+  const std::string rail = "one-sided: low limit of joint rail touches at the start, ";
+  const std::string floor = "one-sided: contact of ball and floor touches at the start, ";
+  for (const Case& c :
+       {Case{cart(R"("gravity": [2, 0])"), "joints/rail/rate", "bodies/cart/mass", rail.c_str()},
+        Case{cart(R"("gravity": [0, 0], "forces": [{"name": "f", "body": "cart", )" + grows),
+             "joints/rail/rate", "bodies/cart/mass", rail.c_str()},
+        Case{ball, "bodies/ball/velocity/y", "bodies/ball/mass", floor.c_str()}}) {
+    const std::string verdict = CertificateFor(c.scene, {c.speed}).verdict;
+    EXPECT_EQ(verdict, std::string(c.reason) + c.speed + " changes the speed at which it opens");
+    EXPECT_EQ(CertificateFor(c.scene, {c.load}).verdict, "trustworthy") << c.scene;
+  }
+}
+
 TEST(CertifyEventsTest, FrictionAtItsLimitIsAKink) {
   // tan of the slope = μ exactly.
   const Certificate c = CertificateOf(R"("gravity": [2.4, -8], "bodies": [{"name": "box",

@@ -230,6 +230,40 @@ TEST(CertifyDerivativeTest, SaysThatADirectionContradictsRedundantRows) {
   }
 }
 
+// Two boxes side by side that slide together: friction between them shifts their weight from one to
+// the other, which their equal friction on the floor does not show. The derivative by the friction
+// of one of them is that of its share; by both, and by the push, there is one.
+TEST(CertifyDerivativeTest, SaysThatSharedLoadsLeaveAFrictionUndetermined) {
+  for (const char* stepping : {"fixed", "event"}) {
+    const Scene scene = SceneOf(R"({"gravity": [0, -10], "bodies": [
+        {"name": "floor", "static": true, "friction": 0.5,
+         "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}},
+        {"name": "a", "shape": {"box": {"size": [0.25, 0.25]}}, "mass": 1, "position": [0, 0.125],
+         "friction": 0.5},
+        {"name": "b", "shape": {"box": {"size": [0.25, 0.25]}}, "mass": 2,
+         "position": [0.25, 0.125], "friction": 0.5}],
+        "pairs": [{"bodies": ["a", "b"], "friction": 0.25}],
+        "forces": [{"name": "push", "body": "a", "force": [30, 0]}],
+        "simulation": {"stepping": ")" +
+                                std::string(stepping) + R"(", "dt": 0.03125, "duration": 0.1}})");
+    Model<double> model;
+    State<double> initial;
+    BuildModel(scene, &model, &initial);
+    for (const auto& [path, reason] :
+         {std::pair{"bodies/a/friction", kUndeterminedFriction},
+          std::pair{"bodies/b/friction", kUndeterminedFriction}, std::pair{"bodies/*/friction", ""},
+          std::pair{"forces/push/force/x", ""}}) {
+      ParameterPath parameter;
+      std::string error;
+      ASSERT_TRUE(ResolveParameter(scene, path, &parameter, &error)) << error;
+      const Certificate c = CertifyDerivative(
+          model, initial,
+          RowMatrixXd(VariableJacobian(scene, model.structure, {DirectionOf(parameter)})), {path});
+      EXPECT_EQ(c.one_sided, reason) << stepping << " " << path << " " << c.verdict;
+    }
+  }
+}
+
 // A box that is pushed with exactly its friction, beside one that slides.
 TEST(CertifyDerivativeTest, AKinkThatNoDirectionMovesIsLeftOut) {
   const Scene scene = SceneOf(R"({"gravity": [0, -8], "bodies": [
