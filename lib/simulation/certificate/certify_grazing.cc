@@ -70,6 +70,7 @@ class GrazeFinder {
       AddTouch(segment);
     }
     AddSlips(segment);
+    if (segment.length > 0.0) last_ = &segment;
     const double reach = segment.length * FastestApproach(segment);
     if (!(reach > 0.0) || !std::isfinite(reach)) {
       return;
@@ -126,18 +127,20 @@ class GrazeFinder {
   }
 
   void AddTouch(const Segment& segment) {
-    const GapCourse start = CourseAt(model_, segment.before, segment.event_contact);
+    // What touches at the start of a motion does so by the motion before it.
+    const Segment& motion = segment.length > 0.0 || last_ == nullptr ? segment : *last_;
+    const GapCourse start = CourseAt(model_, motion.before, segment.event_contact);
     const GapCourse end = CourseAt(model_, segment.after, segment.event_contact);
     // The last rebounds of a body that comes to rest are slow, but they are not grazing.
     const bool from_above =
-        start.gap > search_.TouchTolerance(model_, segment.before, segment.event_contact);
+        start.gap > search_.TouchTolerance(model_, motion.before, segment.event_contact);
     const double gained =
-        from_above && segment.length > 0.0
-            ? std::abs(end.speed - start.speed) / segment.length * model_.structure->settings.dt
+        from_above && motion.length > 0.0
+            ? std::abs(end.speed - start.speed) / motion.length * model_.structure->settings.dt
             : 0.0;
     const double scale = std::max(std::abs(start.speed) + std::abs(end.speed), gained);
     const double ratio = scale > 0.0 ? end.speed / scale : 0.0;
-    const double turns = segment.length > 0.0 ? (end.speed - start.speed) / segment.length : 0.0;
+    const double turns = motion.length > 0.0 ? (end.speed - start.speed) / motion.length : 0.0;
     // What would turn around within a step; a parabola tells nothing of a longer way.
     const bool near = turns > 0.0 && -end.speed <= turns * model_.structure->settings.dt;
     const double depth = near ? 0.5 * end.speed * end.speed / turns : HUGE_VAL;
@@ -208,6 +211,7 @@ class GrazeFinder {
   const Model<double>& model_;
   EventSearch search_;
   double most_;
+  const Segment* last_ = nullptr;  ///< of some length
   std::vector<ActiveContact> near_;
   std::vector<Graze>& grazes_;
 };

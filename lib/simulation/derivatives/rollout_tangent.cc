@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tangible/dynamics/model/tolerances.h"
 #include "tangible/simulation/derivatives/tolerances.h"
 
 namespace tangible {
@@ -46,7 +47,6 @@ double StepTangent::ApplyAndMeasure(const Model<double>& model, Stepper* stepper
                                     RowMatrixXd* w_dot) {
   std::vector<double> driven(static_cast<size_t>(w_dot->cols()), 0.0);
   double worst = 0.0;
-  const size_t num_joints = model.structure->joints.size();
   const auto measure = [&](int c, const ContactProblem<double>& problem,
                            const std::vector<int>& block_of, const SolveDerivative::Rates& rates) {
     double impulse = 0.0;
@@ -65,13 +65,14 @@ double StepTangent::ApplyAndMeasure(const Model<double>& model, Stepper* stepper
       // Friction in a joint, and a motor, have no normal row.
       add(row + 1, normal > 0.0 ? normal : tangent);
     }
-    // Of supports, which stand behind the joints of a whole model.
-    const size_t first = stepper->by_events() ? problem.joints.size() : num_joints;
-    for (size_t j = first; j < problem.joints.size(); ++j) {
+    // Of supports, whose larger proximal terms keep the impulses of a contradiction smaller.
+    for (size_t j = 0; j < problem.joints.size(); ++j) {
       const JointBlock<double>& joint = problem.joints[j];
-      for (int k = 0; k < joint.rows; ++k) {
+      for (int k = 0; k < joint.rows && joint.give[0] == kSupportGive; ++k) {
+        const double mobility =
+            RowMobility(problem.mass, joint.a, joint.row_a[k], joint.b, joint.row_b[k]);
         add(3 * (problem.num_bodies + static_cast<Eigen::Index>(j)) + k,
-            RowMobility(problem.mass, joint.a, joint.row_a[k], joint.b, joint.row_b[k]));
+            kOfSupportGive * joint.give[k] * mobility);
       }
     }
     for (size_t row = 0; row < problem.mass.size(); ++row) {

@@ -59,7 +59,7 @@ class StepTangent {
   /// The same; it also measures how far the derivatives of the contacts' impulses exceed the speeds
   /// that the perturbation drives: the largest over columns of |λ̇| mobility / max(|ṗ| / m, |ċ|,
   /// |v̇|). The usual values are 1 to 1e3; above 1e6 the perturbation contradicts redundant rows
-  /// (it breaks one contact and not the other), and no derivative exists. By events it is 0.
+  /// (it breaks one contact and not the other), and no derivative exists.
   double ApplyAndMeasure(const Model<double>& model, Stepper* stepper, RowMatrixXd* w_dot);
 
  private:

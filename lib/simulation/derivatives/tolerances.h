@@ -12,6 +12,9 @@ inline constexpr double kLinearisedWay = 1e-6;
 /// Of the speeds that a direction has driven in earlier steps of a rollout: what it drives now is
 /// rounding, as once a contact that holds a body has absorbed a change of its speed.
 inline constexpr double kAbsorbed = 1e-13;
+/// Of the factor of the proximal terms of supports: what contradicts the rows of a support causes
+/// impulses that are smaller by that factor, of which a part leaves room for usual ones.
+inline constexpr double kOfSupportGive = 1e-2;
 /// Of the scaled natural residual: impulses chosen in that way solve the step as well.
 inline constexpr double kHoldsAsWell = 1e-9;
 

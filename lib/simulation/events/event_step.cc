@@ -758,7 +758,7 @@ StepReport EventStepper::Advance(const Model<double>& model, double t, double h,
     TakeHeldSpeeds(*model.structure, segment.before.supports, &state->twist);
     state->servo_modes.clear();
     state->supports.clear();
-    supports_.Moved();
+    supports_.Moved(segment.length > kNoMotion * h);
     at_given_time = segment.event == EventKind::kStepEnd;
     tries.halvings = 0;
     if (at_given_time) {

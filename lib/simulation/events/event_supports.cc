@@ -122,7 +122,7 @@ bool EventStepper::HoldsAfter(const Model<double>& model, const Segment& segment
   trial_.before.supports.clear();
   trial_supports_ = supports_;
   trial_guess_ = guess_;
-  supports_.Moved();
+  supports_.Moved(true);
   FindTouching(model, trial_.before);
   StepReport unused;
   const bool chosen = ChooseModes(model, trial_.before, &unused, &trial_) && unused.message.empty();

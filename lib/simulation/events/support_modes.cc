@@ -92,9 +92,17 @@ void SupportModes::TakeEvent(const Segment& segment) {
   }
 }
 
-void SupportModes::Moved() {
+void SupportModes::Stopped() {
+  rested_.clear();
+  for (size_t k = 0; k < speeds_.size(); ++k) {
+    if (speeds_[k] == 0.0) last_speeds_[k] = 0.0;
+  }
+}
+
+void SupportModes::Moved(bool has_length) {
   rested_.clear();
   last_speeds_ = speeds_;
+  if (!has_length) return;
   for (SupportState& one : let_go_) one.slow = SupportState::kNothing;
 }
 
@@ -394,6 +402,11 @@ bool SupportModes::HasToStop(const Model<double>& model, const Segment& segment)
     if (at.holds == SupportState::kNothing) continue;
     if (courses_[k] == Course::kReleased) continue;
     const double* twist = &segment.before.twist[3 * static_cast<size_t>(s.supports[k].body)];
+    // Where the event of another body is at the instant at which this one stops, its speed may be 0
+    // to the bit, and the derivative of its speed is not.
+    const bool is_whole =
+        at.holds == SupportState::kBody || s.supports[k].kind == SupportIndex::kCentre;
+    if (is_whole && speeds_[k] == 0.0 && last_speeds_[k] > 0.0) return true;
     if (at.holds == SupportState::kBody) {
       if (twist[0] != 0.0 || twist[1] != 0.0 || twist[2] != 0.0) return true;
     } else if (s.supports[k].kind == SupportIndex::kCentre) {

@@ -28,10 +28,11 @@ class SupportModes {
   void StartStep(const ModelStructure& structure, double t);
   /// What the event that ended the last motion has found: support k comes to rest, or lets go.
   void TakeEvent(const Segment& segment);
-  /// The last motion has been made.
-  void Moved();
+  /// The last motion has been made, of a length of 0 or not: what an event lets go stays so at its
+  /// instant, in which others may let go too.
+  void Moved(bool has_length);
   /// The twists of what is held are those of rest.
-  void Stopped() { rested_.clear(); }
+  void Stopped();
 
   /// Sets what the supports do in a motion from segment->before, by their speeds there. Speeds up
   /// to `slow` count as 0, m/s.

@@ -238,5 +238,28 @@ TEST(SupportSharesTest, FrictionOfAHingeSlowsABodyThatTurnsAboutItsSupport) {
   EXPECT_NEAR(result.jacobian(2, 1), -12.5, 1e-6);
 }
 
+// A brake and a support hold a body together: it goes with the speed of the brake where that is the
+// stronger one, else not at all, which their rows do not tell.
+TEST(SupportSharesTest, ABrakeBesideASupportHasNoDerivativeBySpeed) {
+  for (const char* stepping : {"fixed", "event"}) {
+    for (const char* limit : {"3", "1"}) {
+      const Scene scene = SceneOf(R"({"gravity": [0, 0], "bodies": [{"name": "b", "mass": 1,
+          "inertia": 1, "position": [0, 0], "support": {"friction": 0.2, "load": 10}}],
+          "joints": [{"name": "rail", "type": "prismatic", "bodies": ["b", "world"],
+          "anchor": [0, 0], "axis": [1, 0], "motor": {"speed": 0, "limit": )" +
+                                  std::string(limit) + R"(}}],
+          "simulation": {"dt": 0.02, "duration": 0.1, "stepping": ")" +
+                                  stepping + R"("}})");
+      const auto verdict = [&](const char* path) {
+        return Jacobian(scene, {path}, GradientMethod::kTangent).certificate.verdict;
+      };
+      EXPECT_EQ(verdict("joints/rail/motor/speed"),
+                "one-sided: redundant contacts contradict the change of a parameter")
+          << stepping << limit;
+      EXPECT_EQ(verdict("bodies/b/mass"), "trustworthy") << stepping << limit;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace tangible

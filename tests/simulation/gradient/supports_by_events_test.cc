@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -631,6 +632,83 @@ TEST(SupportsByEventsTest, AWeakMotorStands) {
   for (const int i : {3, 4, 5}) EXPECT_EQ(result.values[i], 0.0);
   EXPECT_EQ(result.certificate.verdict, "trustworthy");
   ExpectOthersAgree(scene, paths, result);
+}
+
+// Two bodies far apart on one table whose scene does the same with both: each has its own
+// derivative, wherever the instant is rounded to.
+Scene TwoOnATable(const std::string& keys, const std::string& forces, double dt) {
+  return SceneOf(R"({"gravity": [0, 0], "bodies": [
+      {"name": "b", "mass": 1, "inertia": 1, "position": [0, 0], )" +
+                 keys + R"(}, {"name": "c", "mass": 1, "inertia": 1, "position": [0, 3], )" + keys +
+                 R"(}], "forces": [)" + forces +
+                 R"(], "simulation": {"stepping": "event", "duration": 1, "dt": )" +
+                 std::to_string(dt) + "}}");
+}
+
+TEST(SupportsByEventsTest, TwoBodiesStopAtOneInstant) {
+  const std::vector<std::string> paths = {"bodies/b/velocity/x", "bodies/c/velocity/x"};
+  for (const auto& [v, mu, dt] :
+       {std::tuple{1.5, 0.3, 0.03}, std::tuple{1.2, 0.2, 0.25}, std::tuple{2.0, 0.3, 0.03},
+        std::tuple{1.0, 0.2, 0.1}, std::tuple{0.559016994, 0.1, 0.03}}) {
+    const Scene scene =
+        TwoOnATable(R"("velocity": [)" + std::to_string(v) +
+                        R"(, 0], "support": {"load": 10, "friction": )" + std::to_string(mu) + "}",
+                    "", dt);
+    const GradientResult result = Jacobian(scene, paths, GradientMethod::kAdjoint);
+    const double own = v / (10.0 * mu);
+    EXPECT_NEAR(result.jacobian(0, 0), own, 1e-6) << v << " " << dt;
+    EXPECT_NEAR(result.jacobian(0, 1), 0.0, 1e-7) << v << " " << dt;
+    EXPECT_NEAR(result.jacobian(6, 0), 0.0, 1e-7) << v << " " << dt;
+    EXPECT_NEAR(result.jacobian(6, 1), own, 1e-6) << v << " " << dt;
+    ExpectOthersAgree(scene, paths, result);
+  }
+}
+
+// Under forces 2 t both let go at 0.5 s, and are 2 (T − 0.5)³ / 6 on in the end.
+TEST(SupportsByEventsTest, TwoBodiesBreakLooseAtOneInstant) {
+  const std::string ramp = R"("force": {"time": [0, 1], "x": [0, 2], "y": [0, 0],
+      "interpolation": "linear"}})";
+  const std::string forces =
+      R"({"name": "fb", "body": "b", )" + ramp + R"(, {"name": "fc", "body": "c", )" + ramp;
+  for (const char* more : {"", R"(, "radius": 0.2)", R"(, "points": [[0.1, 0], [-0.1, 0]])"}) {
+    for (const double dt : {0.1, 0.07, 0.25}) {
+      const Scene scene = TwoOnATable(
+          R"("support": {"load": 10, "friction": 0.1)" + std::string(more) + "}", forces, dt);
+      const GradientResult result =
+          Jacobian(scene, {"bodies/b/support/friction", "bodies/c/support/friction"},
+                   GradientMethod::kTangent);
+      ASSERT_TRUE(result.done) << result.message;
+      for (int body = 0; body < 2; ++body) {
+        EXPECT_NEAR(result.values[6 * body], 0.125 / 3.0, 1e-9) << more << dt;
+        EXPECT_NEAR(result.jacobian(6 * body, body), -1.25, 1e-6) << more << dt;
+        EXPECT_NEAR(result.jacobian(6 * body, 1 - body), 0.0, 1e-9) << more << dt;
+      }
+    }
+  }
+}
+
+// A limit just where the support stops the body: its way is the smaller one of both.
+TEST(SupportsByEventsTest, ALimitWhereItStopsIsAKink) {
+  for (const double dt : {0.1, 0.03}) {
+    const Scene scene = TableByEvents(R"("inertia": 1, "position": [0, 0], "velocity": [1, 0],
+            "support": {"load": 20, "friction": 0.2})",
+                                      dt, 1.0, "0, 0", R"(], "joints": [{"name": "rail",
+            "type": "prismatic", "bodies": ["b", "world"], "anchor": [0, 0], "axis": [1, 0],
+            "limits": [null, 0.25]})");
+    const std::vector<std::string> paths = {"joints/rail/limits/1", "bodies/b/velocity/x"};
+    const GradientResult both = Jacobian(scene, paths, GradientMethod::kTangent);
+    EXPECT_NE(both.certificate.verdict.find("grazing touch"), std::string::npos)
+        << both.certificate.verdict;
+    for (const DerivativeSide side : {DerivativeSide::kPlus, DerivativeSide::kMinus}) {
+      const GradientResult one =
+          FinalStateJacobian(scene, testing::Resolve(scene, paths),
+                             {.method = GradientMethod::kTangent, .side = side});
+      ASSERT_TRUE(one.done) << one.message;
+      const bool grows = side == DerivativeSide::kPlus;
+      EXPECT_NEAR(one.jacobian(0, 0), grows ? 0.0 : 1.0, 1e-5) << dt;
+      EXPECT_NEAR(one.jacobian(0, 1), grows ? 0.0 : 0.5, 1e-5) << dt;
+    }
+  }
 }
 
 }  // namespace
