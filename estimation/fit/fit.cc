@@ -29,8 +29,9 @@ namespace {
 
 // Further starts are made by default of fits with at most so many recordings.
 constexpr int kMostBlocksOfStarts = 30;
-// Profiles that nobody asked for take as many runs as the fit, or each this many of each recording.
-constexpr long kLeastProfileRuns = 200;
+// Profiles that nobody asked for take twice as many runs as the fit, or each this many of each
+// recording.
+constexpr long kLeastProfileRuns = 400;
 // Profiles may find a better minimum, from which everything is judged anew, so many times.
 constexpr int kMostBetter = 3;
 
@@ -613,7 +614,7 @@ Eigen::VectorXd MakeProfiles(FitRun* run, FitResult* result) {
   Eigen::VectorXd better;
   const auto needed = NeedProfiles(run->options, *result, run->problem, &result->rollouts);
   const long least = kLeastProfileRuns * run->problem->num_blocks();
-  const long most = std::max(least * static_cast<long>(needed.size()), result->rollouts);
+  const long most = std::max(least * static_cast<long>(needed.size()), 2 * result->rollouts);
   long end = result->rollouts + most;
   FitParts* const parts = run->log->parts;
   const bool part = parts != nullptr && parts->is_wanted;  // others make the rest

@@ -170,6 +170,12 @@ struct Reduced {
   RowMatrixXd information;  // A_g
 };
 
+/// The variance that residuals with a leverage do not show, of the whole fit.
+struct Unseen {
+  double variance = 1.0;       // s², of a residual of weight 1
+  double freedom = kInfinity;  // of s²
+};
+
 Reduced Reduce(const RecordingRows& rows, const RobustOptions& options) {
   Reduced reduced;
   reduced.psi = rows.residuals;
@@ -212,6 +218,52 @@ Reduced Reduce(const RecordingRows& rows, const RobustOptions& options) {
     reduced.information += reduced.known;
   }
   return reduced;
+}
+
+/// s² of equation (5); `parameters` of all recordings.
+Unseen UnseenOf(const std::vector<RecordingRows>& recordings, const std::vector<Reduced>& reduced,
+                Eigen::Index parameters) {
+  double sum = 0.0;
+  Eigen::Index rows = 0;
+  for (size_t g = 0; g < recordings.size(); ++g) {
+    if (!(recordings[g].weight > 0.0)) continue;
+    sum += reduced[g].psi.squaredNorm() / recordings[g].weight;
+    rows += reduced[g].psi.size();
+  }
+  Unseen unseen;
+  if (rows > parameters) {
+    unseen.freedom = static_cast<double>(rows - parameters);
+    unseen.variance = sum / unseen.freedom;
+  }
+  return unseen;
+}
+
+/// The sum of equation (5) for these influences, rows x parameters.
+RowMatrixXd UnseenSum(const Unseen& unseen, const RecordingRows& rows, const Reduced& part,
+                      const RowMatrixXd& normal, const RowMatrixXd& influence) {
+  std::vector<int> order(rows.times.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(),
+                   [&](int a, int b) { return rows.times[a] < rows.times[b]; });
+  std::erase_if(order, [&](int i) { return part.counts[i] == 0.0; });
+  RowMatrixXd sum = RowMatrixXd::Zero(influence.cols(), influence.cols());
+  std::vector<int> at;  // the rows at one time
+  for (size_t first = 0; first < order.size(); first += at.size()) {
+    at.clear();
+    for (size_t i = first; i < order.size() && !(rows.times[order[i]] > rows.times[order[first]]);
+         ++i) {
+      at.push_back(order[i]);
+    }
+    const RowMatrixXd shared = part.shared(at, Eigen::all);
+    RowMatrixXd leverage = shared * normal * shared.transpose();
+    if (rows.own.cols() > 0) {
+      const RowMatrixXd own = rows.own(at, Eigen::all);
+      leverage += own * part.own_normal * own.transpose();
+    }
+    const RowMatrixXd hidden = leverage * influence(at, Eigen::all);
+    sum += hidden.transpose() * hidden;
+  }
+  return unseen.variance * rows.weight * sum;
 }
 
 /// The factor f of equation (4) without N / (N − P).
@@ -301,18 +353,21 @@ void AddKnown(const RowMatrixXd& known, RobustCovariance* result) {
   result->shared += known;
 }
 
-/// Equation (4) of the shared parameters.
+/// Equations (4) and (5) of the shared parameters.
 void SumOverTime(const std::vector<RecordingRows>& recordings, const std::vector<Reduced>& reduced,
-                 const RowMatrixXd& normal, double factor, RobustCovariance* result) {
+                 const RowMatrixXd& normal, double factor, const Unseen& unseen,
+                 RobustCovariance* result) {
   const Eigen::Index size = normal.rows();
   result->method = RobustMethod::kTime;
   result->shared = RowMatrixXd::Zero(size, size);
   RowMatrixXd known = RowMatrixXd::Zero(size, size);
+  RowMatrixXd not_seen = RowMatrixXd::Zero(size, size);
   Eigen::VectorXd weights = Eigen::VectorXd::Zero(size);
   Eigen::VectorXd squares = Eigen::VectorXd::Zero(size);
   for (size_t g = 0; g < recordings.size(); ++g) {
-    const KernelResult kernel =
-        KernelCovariance(recordings[g], reduced[g].psi, reduced[g].shared * normal);
+    const RowMatrixXd influence = reduced[g].shared * normal;
+    const KernelResult kernel = KernelCovariance(recordings[g], reduced[g].psi, influence);
+    not_seen += UnseenSum(unseen, recordings[g], reduced[g], normal, influence);
     result->shared += factor * kernel.covariance;
     weights += kernel.weights;
     squares += kernel.square_weights;
@@ -320,11 +375,20 @@ void SumOverTime(const std::vector<RecordingRows>& recordings, const std::vector
     known += reduced[g].known;
   }
   result->shared_freedom = weights.cwiseAbs2().cwiseQuotient(squares);
+  for (Eigen::Index k = 0; k < size; ++k) {
+    const double seen = result->shared(k, k), rest = not_seen(k, k);
+    if (!(rest > 0.0)) continue;
+    result->shared_freedom[k] =
+        (seen + rest) * (seen + rest) /
+        (seen * seen / result->shared_freedom[k] + rest * rest / unseen.freedom);
+  }
+  result->shared += not_seen;
   AddKnown(normal * known * normal, result);
 }
 
 void AddOwn(const std::vector<RecordingRows>& recordings, const std::vector<Reduced>& reduced,
-            double factor, RobustCovariance* result) {
+            const RowMatrixXd& normal, double factor, const Unseen& unseen,
+            RobustCovariance* result) {
   for (size_t g = 0; g < recordings.size(); ++g) {
     if (recordings[g].own.cols() == 0) {
       result->own.emplace_back();
@@ -332,16 +396,18 @@ void AddOwn(const std::vector<RecordingRows>& recordings, const std::vector<Redu
       continue;
     }
     const Reduced& part = reduced[g];
-    const KernelResult kernel =
-        KernelCovariance(recordings[g], part.psi, recordings[g].own * part.own_normal);
+    const RowMatrixXd influence = recordings[g].own * part.own_normal;
+    const KernelResult kernel = KernelCovariance(recordings[g], part.psi, influence);
+    const RowMatrixXd not_seen = UnseenSum(unseen, recordings[g], part, normal, influence);
     const RowMatrixXd of_data = factor * kernel.covariance;
     const RowMatrixXd of_prior = part.own_normal * part.own_known * part.own_normal;
     const RowMatrixXd of_shared = part.from_shared * result->shared * part.from_shared.transpose();
-    result->own.emplace_back(of_data + of_prior + of_shared);
+    result->own.emplace_back(of_data + not_seen + of_prior + of_shared);
     const Eigen::VectorXd freedom = kernel.weights.cwiseAbs2().cwiseQuotient(kernel.square_weights);
     Eigen::VectorXd all(freedom.size());
     for (Eigen::Index k = 0; k < all.size(); ++k) {
-      double uncertain = of_data(k, k) * of_data(k, k) / freedom[k];
+      double uncertain =
+          std::pow(of_data(k, k), 2) / freedom[k] + std::pow(not_seen(k, k), 2) / unseen.freedom;
       // The shared part has degrees of freedom of its own; those of its largest share are used.
       const Eigen::VectorXd shares =
           part.from_shared.row(k).transpose().cwiseAbs2().cwiseProduct(result->shared.diagonal());
@@ -399,13 +465,14 @@ RobustCovariance EstimateRobustCovariance(const std::vector<RecordingRows>& reco
   const RowMatrixXd normal = Decomposition(stacked, options.rank_tolerance).Covariance();
   const double rows = static_cast<double>(stacked_rows);
   const double factor = rows / (rows - static_cast<double>(parameters));
+  const Unseen unseen = UnseenOf(recordings, reduced, parameters);
   // Without shared parameters leaving a recording out moves nothing.
   if (size == 0 || static_cast<int>(recordings.size()) < kFewRecordings ||
       !Jackknife(reduced, recordings, normal, information, options, &result)) {
-    SumOverTime(recordings, reduced, normal, factor, &result);
+    SumOverTime(recordings, reduced, normal, factor, unseen, &result);
   }
   AddKnown(normal * known * normal, &result);
-  AddOwn(recordings, reduced, factor, &result);
+  AddOwn(recordings, reduced, normal, factor, unseen, &result);
   return result;
 }
 

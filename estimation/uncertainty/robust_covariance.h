@@ -27,6 +27,14 @@
 //   f = N / (N − P) / (1 − β + β²/3),    β = S / duration of the recording
 //   ν_k = (Σ_t w_t)² / Σ_tt' k_tt'² w_t w_t',    w_t = Σ_{i at t} (A⁻¹ S̃_iᵀ)_k²
 //
+// A residual whose row decides a parameter alone, as the only sample behind a force, is 0 however
+// large its error: those at a time t have the variance I − H_t. For what they do not show, which is
+// little where many residuals share in a parameter,
+//
+//   V_g += s² Σ_t Z_tᵀ Z_t,   Z_t = H_t S̃_t A⁻¹,   H_t = S̃_t A⁻¹ S̃_tᵀ + O_t (O_gᵀ O_g)⁺ O_tᵀ    (5)
+//
+// is added, with s² = Σ ψ² / (N − P), of N − P degrees of freedom.
+//
 // S follows Andrews: a first-order autoregression (ρ_k, σ_k) of each u_k gives the width 1.1447 (α
 // T)^(1/3) samples, α = Σ_k 4 ρ_k² / ((1 − ρ_k)⁶ (1 + ρ_k)²) / Σ_k 1 / (1 − ρ_k)⁴ with u_k scaled
 // to σ_k = 1. β is at most a third. f compensates for the reduction of the variance of residuals by
@@ -34,7 +42,7 @@
 // prior is a measurement of known deviation: it adds A⁻¹ A_prior A⁻¹, whose degrees of freedom are
 // infinite. An interval is ± the 0.975 quantile of Student's t with ν_k degrees of freedom.
 //
-// Own parameters of a recording have (4) of O_g⁺ ψ alone, and D_g V D_gᵀ of the shared ones.
+// Own parameters of a recording have (4) and (5) of O_g⁺ ψ alone, and D_g V D_gᵀ of the shared ones.
 //
 // References: D. W. K. Andrews, Econometrica 59 (1991) 817, eqs. (5.1), (6.2), (6.4); W. K. Newey
 // and K. D. West, Econometrica 55 (1987) 703; N. M. Kiefer and T. J. Vogelsang, Econometric Theory
@@ -75,7 +83,7 @@ struct RobustOptions {
 enum class RobustMethod {
   kNone,        ///< fewer residuals than parameters
   kRecordings,  ///< (3)
-  kTime,        ///< (4)
+  kTime,        ///< (4) and (5)
 };
 
 /// "none", "recordings", "time".

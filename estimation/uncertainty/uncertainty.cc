@@ -175,9 +175,25 @@ class Estimator {
     }
   }
 
+  /// Whether a derivative with this square of its norm is rounding, as where the cost is flat.
+  bool HasNoEffect(int parameter, double square) const {
+    const double magnitude =
+        std::max(std::abs(estimate_[parameter]), entries_[static_cast<size_t>(parameter)].scale);
+    return magnitude * std::sqrt(square) < kNoDerivative;
+  }
+
   /// Eliminates the own parameters from the rows of each block and decomposes the rest.
   void Eliminate() {
     const Eigen::Index shared = static_cast<Eigen::Index>(shared_.size());
+    Eigen::VectorXd all_squares = Eigen::VectorXd::Zero(shared);
+    for (size_t b = 0; b < blocks_.size(); ++b) {
+      all_squares += problem_.weight(static_cast<int>(b)) *
+                     blocks_[b].jacobian(Eigen::all, shared_).colwise().squaredNorm().transpose();
+    }
+    for (Eigen::Index i = 0; i < shared; ++i) {
+      without_effect_.push_back(HasNoEffect(shared_[static_cast<size_t>(i)], all_squares[i]) ? 1
+                                                                                             : 0);
+    }
     Eigen::VectorXd squares = Eigen::VectorXd::Zero(shared);
     for (size_t b = 0; b < blocks_.size(); ++b) {
       EliminateOwn(static_cast<int>(b));
@@ -211,6 +227,14 @@ class Estimator {
     const double root = std::sqrt(problem_.weight(block));
     part.shared_rows = root * evaluation.jacobian(Eigen::all, shared_);
     part.own_rows = root * evaluation.jacobian(Eigen::all, local);
+    for (size_t i = 0; i < shared_.size(); ++i) {
+      const auto at = static_cast<Eigen::Index>(i);
+      if (without_effect_[i] != 0) part.shared_rows.col(at).setZero();
+    }
+    for (size_t i = 0; i < part.own.size(); ++i) {
+      auto column = part.own_rows.col(static_cast<Eigen::Index>(i));
+      if (HasNoEffect(part.own[i], column.squaredNorm())) column.setZero();
+    }
     RowMatrixXd own = part.own_rows;
     part.reduced = part.shared_rows;
     for (int i = 0; i < problem_.num_observation_rows(block) && options_.huber > 0.0; ++i) {
@@ -548,7 +572,8 @@ class Estimator {
   const std::vector<BlockEvaluation>& blocks_;
   const UncertaintyOptions& options_;
   int num_free_ = 0;
-  std::vector<int> shared_;  ///< those that are free
+  std::vector<char> without_effect_;  ///< of shared_: its derivative is rounding
+  std::vector<int> shared_;           ///< those that are free
   std::vector<BlockPart> parts_;
   std::optional<Decomposition> decomposition_;  ///< of S̃
   RowMatrixXd shared_covariance_;

@@ -141,10 +141,67 @@ TEST(RobustCovarianceTest, KernelAndFreedomAreTheirSums) {
   }
   const double beta = width / (rows.times.back() - rows.times.front());
   const double factor = 60.0 / 58.0 / (1.0 - beta + beta * beta / 3.0);
-  EXPECT_LT((robust.shared - factor * sum).norm(), 1e-12 * sum.norm());
+  // What residuals at one time do not show, equation (5).
+  RowMatrixXd hidden = RowMatrixXd::Zero(2, 2);
+  for (int i = 0; i < 60; ++i) {
+    for (int j = 0; j < 60; ++j) {
+      for (int l = 0; l < 60; ++l) {
+        if (rows.times[i] != rows.times[j] || rows.times[i] != rows.times[l]) continue;
+        const auto leverage = [&](int p, int q) {
+          return rows.shared.row(p).dot(normal * rows.shared.row(q).transpose());
+        };
+        hidden += leverage(i, j) * leverage(i, l) * (normal * rows.shared.row(j).transpose()) *
+                  (normal * rows.shared.row(l).transpose()).transpose();
+      }
+    }
+  }
+  hidden *= rows.residuals.squaredNorm() / 58.0;
+  EXPECT_LT((robust.shared - factor * sum - hidden).norm(), 1e-12 * sum.norm());
+  EXPECT_LT(hidden.norm(), 0.01 * sum.norm());
   for (int k = 0; k < 2; ++k) {
-    EXPECT_NEAR(robust.shared_freedom[k], weights[k] * weights[k] / squares[k],
+    const double seen = factor * sum(k, k);
+    const double freedom = weights[k] * weights[k] / squares[k];
+    EXPECT_NEAR(robust.shared_freedom[k],
+                std::pow(seen + hidden(k, k), 2) /
+                    (seen * seen / freedom + std::pow(hidden(k, k), 2) / 58.0),
                 1e-9 * robust.shared_freedom[k]);
+  }
+}
+
+// A force that acts just before the last sample moves that one alone: its residual is 0 whatever
+// its error. One that moves two coordinates of it leaves one combination of them 0.
+TEST(RobustCovarianceTest, CoversWhatASingleSampleDecides) {
+  constexpr int kReplicas = 400;
+  constexpr int kSamples = 20;
+  for (const bool both_coordinates : {false, true}) {
+    for (const double noise : {1.0, 3.0}) {
+      std::mt19937 random(5);
+      std::normal_distribution<double> normal(0.0, noise);
+      double covered = 0.0;
+      for (int replica = 0; replica < kReplicas; ++replica) {
+        RecordingRows rows;
+        rows.shared = RowMatrixXd::Zero(2 * kSamples, 1);
+        rows.own = RowMatrixXd::Zero(2 * kSamples, 1);
+        Eigen::VectorXd error(2 * kSamples);
+        for (int i = 0; i < 2 * kSamples; ++i) {
+          rows.times.push_back(0.1 * (i / 2));
+          if (i % 2 == 0) rows.own(i, 0) = 1.0;
+          error[i] = normal(random);
+        }
+        rows.shared(2 * kSamples - 2, 0) = both_coordinates ? 0.5 : 0.0;
+        rows.shared(2 * kSamples - 1, 0) = 1.0;
+        RowMatrixXd all(2 * kSamples, 2);
+        all << rows.shared, rows.own;
+        const Eigen::Vector2d moved = all.colPivHouseholderQr().solve(error);
+        rows.residuals = error - all * moved;
+        const RobustCovariance robust =
+            EstimateRobustCovariance({rows}, RowMatrixXd(0, 1), RobustOptions());
+        const double half =
+            StudentQuantile(robust.shared_freedom[0]) * std::sqrt(robust.shared(0, 0));
+        covered += std::abs(moved[0]) < half ? 1.0 / kReplicas : 0.0;
+      }
+      EXPECT_NEAR(covered, 0.95, kSpread) << both_coordinates << " " << noise;
+    }
   }
 }
 

@@ -255,5 +255,31 @@ TEST(UncertaintyTest, WhatABlockDoesNotDetermineTakesNoOtherInterval) {
   EXPECT_EQ(result.combinations[0].sum, "'e' - 2 'f'");
 }
 
+// A derivative that is rounding, as of a cost that is flat about the estimate, determines nothing,
+// of a parameter that is shared or a recording's own; sizes of parameters do not matter.
+TEST(UncertaintyTest, ADerivativeThatIsRoundingDeterminesNothing) {
+  for (const int num_shared : {0, 1}) {
+    for (const double size : {1e-6, 1.0, 1e6}) {
+      std::vector<BlockEvaluation> blocks(1);
+      blocks[0].residuals = Eigen::Vector4d(1.0, -2.0, 0.5, 0.25);
+      std::vector<ParameterEntry> entries = Entries(1);
+      entries[0].scale = size;
+      const auto deviation = [&](double derivative) {
+        blocks[0].jacobian =
+            RowMatrixXd(Eigen::Vector4d(1.0, 0.5, 0.0, -1.0) * (derivative / size));
+        const RowsProblem problem(entries, num_shared, blocks, {{}});
+        return EstimateUncertainty(problem, Eigen::VectorXd::Constant(1, size), blocks, {});
+      };
+      const Uncertainty flat = deviation(1e-16);
+      EXPECT_TRUE(std::isnan(flat.standard_deviation[0])) << flat.standard_deviation[0];
+      EXPECT_NE(flat.messages[0].find("not determined"), std::string::npos) << flat.messages[0];
+      EXPECT_FALSE(flat.confidence_95[0]);
+      EXPECT_FALSE(flat.confidence_95_robust[0]);
+      const Uncertainty weak = deviation(1e-6);
+      EXPECT_NEAR(weak.standard_deviation[0], 1e6 * size / 1.5, 1e-6 * 1e6 * size);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace tangible
