@@ -24,6 +24,8 @@ constexpr double kDifference = 0.05;
 constexpr double kChordStep = 0.2;
 // Smoothings at the initial parameters before the first fit.
 constexpr int kRoundsAtStart = 4;
+// Of the first intensity, where the search begins without forces.
+constexpr double kNextToNone = 1e-4;
 // A deviation of ln s above which no force is seen: a factor of 1e4 changes nothing.
 constexpr double kUnseen = 9.2;
 
@@ -240,15 +242,31 @@ std::vector<NoiseIntensity> IntensitiesOf(const RecordingsProblem& problem) {
   return all;
 }
 
-void BeginIntensities(RecordingsProblem* problem) {
+namespace {
+
+/// Those that are to be estimated become a share of the first ones.
+void BeginAt(double share, RecordingsProblem* problem) {
   const RolloutResiduals& run = *problem->run(0);
   Eigen::VectorXd intensities = run.noise()->intensities();
   for (int i = 0; i < run.noise()->num_terms(); ++i) {
     const NoiseTerm& term = run.noise()->terms()[i];
-    if (!term.intensity) intensities[i] = FirstIntensity(term, run);
+    if (!term.intensity) intensities[i] = share * FirstIntensity(term, run);
   }
   for (int b = 0; b < problem->num_blocks(); ++b) problem->run(b)->noise()->Forget();
   SetAll(intensities, problem);
+}
+
+}  // namespace
+
+void BeginIntensities(RecordingsProblem* problem) { BeginAt(1.0, problem); }
+void BeginWithoutForces(RecordingsProblem* problem) { BeginAt(kNextToNone, problem); }
+
+void SetIntensities(const std::vector<NoiseIntensity>& intensities, RecordingsProblem* problem) {
+  Eigen::VectorXd all(static_cast<Eigen::Index>(intensities.size()));
+  for (size_t i = 0; i < intensities.size(); ++i) {
+    all[static_cast<Eigen::Index>(i)] = intensities[i].intensity;
+  }
+  SetAll(all, problem);
 }
 
 namespace {
@@ -418,7 +436,7 @@ void FillPlaces(const RolloutResiduals& run, SmoothedRun* smoothed) {
 
 bool UpdateIntensities(const FitOptions& options, const FitResult& result,
                        RecordingsProblem* problem, std::vector<NoiseIntensity>* intensities,
-                       double* largest, std::string* message) {
+                       double* largest, std::string* message, double* minus_log) {
   NoiseLikelihood likelihood;
   if (!likelihood.Create(options, result.estimate, NoiseLikelihood::Parameters::kFree, problem,
                          message))
@@ -431,6 +449,7 @@ bool UpdateIntensities(const FitOptions& options, const FitResult& result,
   }
   SetAll(search.Intensities(), problem);
   *largest = std::max(*largest, search.largest());
+  if (minus_log != nullptr) *minus_log = likelihood.At(search.Intensities()).minus_log;
   return true;
 }
 

@@ -101,12 +101,16 @@ void BeginIntensities(RecordingsProblem* problem);
 void SettleIntensities(const FitOptions& options, RecordingsProblem* problem,
                        std::vector<NoiseIntensity>* intensities);
 
+/// Sets those that are to be estimated to next to none: the model has to explain all.
+void BeginWithoutForces(RecordingsProblem* problem);
+void SetIntensities(const std::vector<NoiseIntensity>& intensities, RecordingsProblem* problem);
+
 /// Finds the intensities that are to be estimated at the result of a fit, and sets them in
-/// `problem`. `largest` is raised to the largest change in multiples of its deviation. False, with
-/// a message, where that is not possible.
+/// `problem`. `largest` is raised to the largest change in multiples of its deviation; `minus_log`
+/// becomes (1), unless it is null. False, with a message, where that is not possible.
 bool UpdateIntensities(const FitOptions& options, const FitResult& result,
                        RecordingsProblem* problem, std::vector<NoiseIntensity>* intensities,
-                       double* largest, std::string* message);
+                       double* largest, std::string* message, double* minus_log = nullptr);
 
 /// Forces and states at an estimate; empty, with a message, where that is not possible.
 std::vector<SmoothedRun> SmoothedRuns(const FitOptions& options, const Eigen::VectorXd& estimate,

@@ -2,6 +2,8 @@
 #include "tangible/estimation/fit/variance_components.h"
 
 #include <algorithm>
+#include <cmath>
+#include <functional>
 #include <string>
 #include <utility>
 
@@ -58,6 +60,37 @@ bool Update(const FitOptions& options, RecordingsProblem* problem, FitResult* re
           UpdateNoise(options, *result, problem, &components->noise, largest, &result->message)) &&
          (!spreads || UpdateSpreads(options, *result, problem, &components->spreads, largest,
                                     &result->message));
+}
+
+/// Random forces follow what poor initial values miss, and there their likelihood may have a mode
+/// of its own, or none that is found: where a fit that begins without them has a larger one, it
+/// becomes the result.
+void TryWithoutForces(const FitOptions& options, const std::function<FitResult()>& fit,
+                      RecordingsProblem* problem, FitResult* result,
+                      std::vector<NoiseIntensity>* forces) {
+  constexpr double kLarger = 1.0;  // nats: both are found to less
+  std::vector<NoiseIntensity> follow = *forces, without = *forces;
+  double unused = 0.0, of_follow = HUGE_VAL, of_without = 0.0;
+  std::string none;
+  if (result->status == FitStatus::kConverged &&
+      !UpdateIntensities(options, *result, problem, &follow, &unused, &none, &of_follow)) {
+    return;
+  }
+  BeginWithoutForces(problem);
+  without = IntensitiesOf(*problem);
+  FitResult other = fit();
+  const bool is_better =
+      other.status == FitStatus::kConverged &&
+      UpdateIntensities(options, other, problem, &without, &unused, &none, &of_without) &&
+      of_without < of_follow - kLarger;
+  SetIntensities(is_better ? without : *forces, problem);
+  if (!is_better) {
+    result->rollouts += other.rollouts;
+    result->seconds += other.seconds;
+    return;
+  }
+  *forces = without;
+  Append(std::move(other), result);
 }
 
 /// What is said of the random forces, and their course, of a result that is the last one.
@@ -135,10 +168,10 @@ FitResult FitWithComponents(const FitOptions& asked, RecordingsProblem* problem,
   if (!estimates) {
     return fit(options, progress, &same);
   }
-  if (std::any_of(components->forces.begin(), components->forces.end(),
-                  [](const NoiseIntensity& one) { return one.estimated; })) {
-    SettleIntensities(options, problem, &components->forces);
-  }
+  const bool estimates_forces =
+      std::any_of(components->forces.begin(), components->forces.end(),
+                  [](const NoiseIntensity& one) { return one.estimated; });
+  if (estimates_forces) SettleIntensities(options, problem, &components->forces);
   // The tests that judge the estimate are made once, with the final components.
   FitOptions search = options;
   search.certificate = CertificatePass::kSkip;
@@ -147,6 +180,10 @@ FitResult FitWithComponents(const FitOptions& asked, RecordingsProblem* problem,
   search.profiles.clear();
   search.leverages = components->noise.empty() ? Leverages::kSkip : Leverages::kCompute;
   FitResult result = fit(search, progress, &same);
+  if (estimates_forces && same) {
+    const auto again = [&] { return fit(search, {}, &same); };
+    TryWithoutForces(options, again, problem, &result, &components->forces);
+  }
   search.starts = 1;
   search.approach = FitApproach::kPlain;
   for (int fits = 1; same && result.status == FitStatus::kConverged; ++fits) {

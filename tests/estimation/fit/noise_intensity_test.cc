@@ -119,6 +119,29 @@ TEST(NoiseIntensityTest, WhereTheModelIsRightNoForceIsSeen) {
               4.0 * fitted.result.uncertainty.standard_deviation[1]);
 }
 
+// A block slides and stops, as the model has it. From poor initial values random forces follow the
+// observations, and the fit with them does not find what one without them finds at once.
+TEST(NoiseIntensityTest, PoorInitialValuesAreNoRandomForce) {
+  FitProblem problem;
+  problem.scene = MakeScene(R"({"gravity": [0, -10], "bodies": [
+      {"name": "block", "shape": {"box": {"size": [0.2, 0.2]}}, "mass": 1, "position": [0, 0.1],
+       "velocity": [2, 0]},
+      {"name": "floor", "static": true, "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
+      "pairs": [{"bodies": ["block", "floor"], "friction": 0.2}],
+      "simulation": {"dt": 0.01, "duration": 1.5}})");
+  problem.observations = Observe(problem.scene, 5, 1e-3, 1);
+  std::erase_if(problem.observations,
+                [](const Observation& one) { return one.coordinate != Coordinate::kX; });
+  problem.parameters = {Parameter("pairs/block:floor/friction", 0.1),
+                        Parameter("bodies/block/velocity/x", 1.5)};
+  problem.process_noise = {Term("block", "", NoiseCoordinate::kX, std::nullopt)};
+  const Fitted fitted = FitOf(InputOf(problem));
+  const double deviation = fitted.result.uncertainty.standard_deviation[0];
+  EXPECT_NEAR(fitted.result.estimate[0], 0.2, 4.0 * deviation);
+  EXPECT_LT(deviation, 1e-3);
+  EXPECT_LT(fitted.components.forces[0].intensity, 0.02);
+}
+
 /// A sled that random forces drive, from 3 m/s on.
 struct Sled {
   static constexpr double kMass = 2.0;
