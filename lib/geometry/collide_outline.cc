@@ -263,17 +263,19 @@ class OutlinePair {
 
 }  // namespace
 
-int NearerRun(const Outline& outline, int run, const Vector2<double>& x) {
+Vector2<double> NearerNormal(const Outline& outline, int run, const Vector2<double>& x) {
+  const Vector2<double> none(0.0, 0.0);
   const OutlineRun& of = outline.run(run);
   const double s = of.tangent.dot(x - of.start);
   const double depth = -of.normal.dot(x - of.start);
   const bool is_shallow = depth > 0.0 && depth <= kBehindFace * of.length;
-  if (!is_shallow || s < 0.0 || s > of.length || outline.HasSeams()) return -1;
+  if (!is_shallow || s < 0.0 || s > of.length || outline.HasSeams()) return none;
   const bool is_after = outline.IsAfterStart(run, x);
-  if (is_after == outline.IsBeforeEnd(run, x)) return -1;
+  if (is_after == outline.IsBeforeEnd(run, x)) return none;
   const OutlineJoint joint = is_after ? of.after : of.before;
-  if (joint != OutlineJoint::kConvex) return -1;
-  return is_after ? outline.Next(run) : outline.Previous(run);
+  if (joint == OutlineJoint::kEnd) return is_after ? of.tangent : Vector2<double>(-of.tangent);
+  if (joint != OutlineJoint::kConvex) return none;
+  return outline.run(is_after ? outline.Next(run) : outline.Previous(run)).normal;
 }
 
 }  // namespace tangible::internal

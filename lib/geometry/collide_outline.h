@@ -47,9 +47,10 @@ inline Pose<double> RelativeTo(const Pose<double>& frame, const Pose<double>& po
   return relative;
 }
 
-/// The run at a convex joint that a point over another one, a little behind both, is nearer to; −1:
-/// none, and where neighbours hide a part of the outline.
-int NearerRun(const Outline& outline, int run, const Vector2<double>& x);
+/// The normal of the run at a convex joint, or of the wall down from an open end, that a point over
+/// another run, a little behind both, is nearer to; none, and where neighbours hide a part of the
+/// outline: 0.
+Vector2<double> NearerNormal(const Outline& outline, int run, const Vector2<double>& x);
 
 /// Whether a corner at x is over a run. Just behind it and beside its end it is, however near the
 /// next run is, where it does not face that one: the corner of a body that rocks on a face of its
@@ -57,8 +58,8 @@ int NearerRun(const Outline& outline, int run, const Vector2<double>& x);
 template <typename Faces>
 bool IsOverOrBehind(const Outline& outline, int run, const Vector2<double>& x, const Faces& faces) {
   if (outline.IsOver(run, x)) return true;
-  const int beside = NearerRun(outline, run, x);
-  return beside >= 0 && !faces(outline.run(beside).normal);
+  const Vector2<double> beside = NearerNormal(outline, run, x);
+  return !beside.isZero(0.0) && !faces(beside);
 }
 
 inline double DistanceOfSegment(const Vector2<double>& start, const Vector2<double>& end,
