@@ -443,6 +443,7 @@ void RolloutCertifier::AddStep(const Model<double>& model, long step, Stepper* s
   certificate_.degenerate_rows += static_cast<int>(degenerate.size());
   AddServos(model, step, record);
   AddSupports(model, step, record);
+  if (step == 0) touching_at_start_ = record.contacts;
   AddLinearSystem(model, record, &stepper->system());
   AddFeatures(model, record, step, &stepper->system());
   last_.Keep(model, record);
@@ -522,6 +523,14 @@ void RolloutCertifier::AddReleases(const Model<double>& model) {
   }
 }
 
+// Whether a body has a joint or spring, or touches another one as the run starts.
+bool RolloutCertifier::ActsAtStart(const ModelStructure& s, int body) const {
+  const auto has = [body](const auto& one) { return one.a == body || one.b == body; };
+  return std::any_of(s.joints.begin(), s.joints.end(), has) ||
+         std::any_of(s.springs.begin(), s.springs.end(), has) ||
+         std::any_of(touching_at_start_.begin(), touching_at_start_.end(), has);
+}
+
 // Jumps of a path's rate at which the derivative by its delay has two sides.
 void RolloutCertifier::AddPaths(const Model<double>& model) {
   const ModelStructure& s = *model.structure;
@@ -537,7 +546,7 @@ void RolloutCertifier::AddPaths(const Model<double>& model) {
       const long step =
           static_cast<long>(std::clamp(steps, 0.0, static_cast<double>(NumSteps(s.settings))));
       if (IsSameInstant(s, time, 0.0)) {
-        OneSided(which + " s is the start of the run");
+        if (ActsAtStart(s, index.body)) OneSided(which + " s is the start of the run");
       } else if (IsSameInstant(s, time, s.settings.duration)) {
         OneSided(which + " s is the end of the run");
       } else if (s.settings.stepping == Stepping::kFixed &&

@@ -157,6 +157,7 @@ class RolloutCertifier {
   void AddForceWindows(const Model<double>& model);
   void AddReleases(const Model<double>& model);
   void AddPaths(const Model<double>& model);
+  bool ActsAtStart(const ModelStructure& s, int body) const;
   bool Wanted(int number) const;
   /// The directions of the variables of the island that is looked at.
   const RowMatrixXd& Directions() const {
@@ -238,6 +239,8 @@ class RolloutCertifier {
   std::vector<BesideJump> beside_jumps_;
   // The three of all islands, while closed_, loaded_ and struck_at_ are those of one.
   std::vector<ActiveContact> all_closed_, all_loaded_;
+  std::vector<ActiveContact>
+      touching_at_start_;  ///< of fixed steps those that may close in the first
   std::vector<double> all_struck_at_;
   const IslandRecord* island_ = nullptr;  ///< whose bodies and numbers are looked at
   RowMatrixXd own_directions_;            ///< the directions of its variables

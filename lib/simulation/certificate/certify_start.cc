@@ -196,6 +196,7 @@ void RolloutCertifier::AddStart(const Model<double>& model, const EventRecord& r
   LocalJacobianScratch scratch;
   for (size_t k = 0; k < touching.size(); ++k) {
     const ActiveContact* contact = touching[k];
+    touching_at_start_.push_back(island_ != nullptr ? island_->InWhole(*contact) : *contact);
     std::vector<JacobianEntry> gap, approach, slip;
     AddGapGradient(model, *start, *contact, &scratch, &gap);
     AddApproachGradient(model, *start, *contact, &scratch, &approach);
