@@ -39,7 +39,7 @@ bool Take(const GradientProblem& problem, const RolloutOutput& output, GradientR
   if (output.fallbacks > 0) {
     result->notes.push_back(
         std::to_string(output.fallbacks) +
-        " steps by the implicit derivative: the unrolled interior point failed");
+        " steps by the implicit derivative: the unrolled interior point failed, as at kinks");
   }
   return true;
 }

@@ -59,9 +59,9 @@ template <typename T>
 using JetObserver = std::function<void(long k, double t, const State<T>& state, Stepper* stepper)>;
 
 /// A rollout in Jets beside one in double, which makes the discrete choices. `fallbacks` counts
-/// unrolled steps in which the interior point failed and the implicit derivative was used instead;
-/// values that differ from the double step's by more than kBranchTolerance (a different branch)
-/// fail the rollout with a message.
+/// unrolled steps in which the interior point failed, or found values that differ from the double
+/// step's by more than kBranchTolerance (at a kink, or a different branch), and the implicit
+/// derivative was used instead; where its values differ too the rollout fails with a message.
 template <typename T>
 RolloutReport RolloutJets(ControlledModel<T>* model, const State<T>& initial, JetRoute route,
                           const JetObserver<T>& observer, State<T>* final, long* fallbacks);

@@ -3,6 +3,8 @@
 // Jacobians by Jets: passes of the Jets' width, and builds without Jets.
 #include <gtest/gtest.h>
 
+#include <tuple>
+
 #include "../../support/gradients.h"
 #include "../../support/scenes.h"
 
@@ -66,6 +68,32 @@ TEST(GradientJets, ValuesAreThoseOfTheRunInDouble) {
       JacobianOf(scene, {"bodies/ball/mass"}, GradientMethod::kJetImplicit);
   ASSERT_TRUE(tangent.done && implicit.done) << tangent.message << implicit.message;
   EXPECT_EQ(tangent.values, implicit.values);
+}
+
+// A box that stops exactly as a step ends: there the unrolled interior point has half of the digits
+// of its values, and the step's implicit derivative takes its place.
+TEST(GradientJets, UnrolledStepsAtAKinkGoOn) {
+  if (WidestJet() == 0) {
+    GTEST_SKIP() << "built without Jets";
+  }
+  for (const auto& [v, mu, dt] :
+       {std::tuple{3.0, 0.3, 0.25}, std::tuple{2.0, 0.2, 0.25}, std::tuple{3.0, 0.3, 0.5}}) {
+    const Scene scene = test_scenes::SceneOf(
+        R"({"gravity": [0, -10], "bodies": [
+        {"name": "floor", "static": true, "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}},
+        {"name": "b", "shape": {"box": {"size": [0.4, 0.2]}}, "mass": 1, "position": [0, 0.1],
+         "velocity": [)" +
+        std::to_string(v) + R"(, 0]}], "pairs": [{"bodies": ["b", "floor"], "friction": )" +
+        std::to_string(mu) + R"(}], "simulation": {"duration": 1.5, "dt": )" + std::to_string(dt) +
+        "}}");
+    const GradientResult jets = JacobianOf(scene, {"bodies/b/velocity/x"}, GradientMethod::kJet);
+    ASSERT_TRUE(jets.done) << jets.message;
+    EXPECT_GT(jets.fallbacks, 0);
+    const GradientResult tangent =
+        JacobianOf(scene, {"bodies/b/velocity/x"}, GradientMethod::kTangent);
+    EXPECT_NEAR(jets.jacobian(0, 0), tangent.jacobian(0, 0), 1e-4);
+    EXPECT_EQ(jets.values, tangent.values);
+  }
 }
 
 TEST(GradientJets, WithoutAWidthTheMessageSaysSo) {
