@@ -471,6 +471,19 @@ void ChoiceWatch::AddForces(const Model<double>& model, const IslandRecord& isla
   }
 }
 
+namespace {
+
+// Whether a motion ends at an edge, and not at a fraction of its step that supports, or stages that
+// do not converge, have shortened it to.
+bool EndsAtEdge(const Model<double>& model, const Segment& segment) {
+  if (segment.event != EventKind::kEdge) return false;
+  const double end = segment.time + segment.length;
+  const double near = 2.0 * kSameInstant * model.structure->settings.dt;
+  return segment.length == 0.0 || !EdgesWithin(model, end - near, end + near).empty();
+}
+
+}  // namespace
+
 void ChoiceWatch::AddSegment(const Model<double>& model, const IslandRecord& island, long step,
                              Segment* segment) {
   if (segment->length > 0.0) {
@@ -479,7 +492,7 @@ void ChoiceWatch::AddSegment(const Model<double>& model, const IslandRecord& isl
       AddForces(model, island, step, *segment, i, share);
     }
   }
-  if (segment->IsEventLocated() || segment->event == EventKind::kEdge) {
+  if (segment->IsEventLocated() || EndsAtEdge(model, *segment)) {
     EndPhases(island, *segment);
     AddEvent(model, island, *segment);
   }

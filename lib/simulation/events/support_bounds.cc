@@ -118,7 +118,13 @@ void EventSearch::SearchStop(const Model<double>& model, int support, Event* eve
   const double tolerance = kLocatedOfSize * fa;
   // At the end of the motion a speed that is rounding has reached 0: the next motion would take it
   // for rest, and could not find the event.
-  const double at_end = ProgressOfSpeed(model, segment_->before, support, at, slow_);
+  const SupportIndex& index = model.structure->supports[support];
+  support_.Set(model, segment_->before, index, 1.0);
+  const double gained = support_.limit() /
+                        model.parameters[model.structure->bodies[index.body].mass] *
+                        model.structure->settings.dt;
+  const double at_end = ProgressOfSpeed(model, segment_->before, support, at,
+                                        std::max(slow_, kStandingPoint * gained));
   Event trial;
   trial.kind = EventKind::kSupportStops;
   trial.contact = ContactOfSupport(*model.structure, support);

@@ -71,6 +71,21 @@ TEST(ValidityRadius, OfAFallEndsWhereTheImpactLeavesTheRun) {
   EXPECT_NEAR(fall.radius[0].down, (g * t - 1e-3) * t, 1e-6) << fall.radius[0].down_where;
 }
 
+// It stops at v / 2 s, also on a step's end: of a speed that takes 1 s the stop leaves the run. The
+// fractions of steps to which its motions are shortened are no events.
+TEST(ValidityRadius, OfABodyThatStopsOnItsSupport) {
+  for (const char* dt : {"0.1", "0.05", "0.03", "0.25"}) {
+    const Certificate stop = CertificateOf(
+        R"({"gravity": [0, 0], "bodies": [{"name": "b", "mass": 1, "inertia": 1, "position": [0, 0],
+            "velocity": [1, 0], "support": {"friction": 0.2, "load": 10}}],
+            "simulation": {"duration": 1, "dt": )" +
+            std::string(dt) + "}}",
+        "bodies/b/velocity/x", Stepping::kEvent);
+    EXPECT_NEAR(stop.radius[0].up, 1.0, 1e-6) << dt << " " << stop.radius[0].up_where;
+    EXPECT_TRUE(std::isinf(stop.radius[0].down)) << dt << " " << stop.radius[0].down_where;
+  }
+}
+
 // ẋ of the start adds v T: in units of the scene and of the duration the flow is [1 1; 0 1], whose
 // largest singular value is the golden ratio.
 TEST(ValidityRadius, GrowthOfAFreeFlightIsTheGoldenRatio) {
