@@ -151,6 +151,7 @@ bool FindStart(const FitOptions& options, LeastSquaresProblem* problem, Lineariz
             : name + "effect on any residual" +
                   (entries.size() > 1 ? ", neither at the initial values nor where the others lead"
                                       : "");
+  for (const std::string& line : problem->FindInconsistencies(p)) result->message += "; " + line;
   return false;
 }
 

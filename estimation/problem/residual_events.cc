@@ -87,7 +87,7 @@ std::vector<std::string> RolloutResiduals::DescribeMissingEvents() {
     std::ostringstream line;
     line << "event " << scene_.instruments().events[one.event].name << " " << one.number
          << ", recorded at " << one.time
-         << " s, does not happen in the motion at the estimate; its residual is that of the time "
+         << " s, does not happen in this motion; its residual is that of the time "
          << event_times_.Value(row) << " s, which "
          << (event_times_.LeadsTowards(row) ? "leads towards it" : "no parameter changes");
     lines.push_back(line.str());

@@ -84,6 +84,10 @@ bool FitTheStart(const FitOptions& options, bool from_observations, const std::v
   if (result.status != FitStatus::kConverged) {
     run->message =
         std::string("the fit of its start: ") + NameOf(result.status) + ": " + result.message;
+    if (run->first_part->num_residuals() == 0) {
+      run->message +=
+          ": it has no observation until \"state_from\", " + CompactNumber(run->state_from) + " s";
+    }
   }
   if (result.estimate.size() == 0) return false;
   run->parameters = state.All(result.estimate);
