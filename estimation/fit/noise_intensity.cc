@@ -434,6 +434,43 @@ void FillPlaces(const RolloutResiduals& run, SmoothedRun* smoothed) {
 
 }  // namespace
 
+namespace {
+
+/// Far below its mode the likelihood does not change with an intensity, and a search there sees no
+/// force. Sets those of which none was seen to the share of the first ones that has the largest
+/// likelihood; whether it is larger than what was found.
+bool BeginWhereSeen(const NoiseLikelihood& likelihood, const RolloutResiduals& run,
+                    const std::vector<NoiseIntensity>& found, std::vector<NoiseIntensity>* begin) {
+  constexpr double kLarger = 0.5;  // nats
+  const auto minus_log = [&](const std::vector<NoiseIntensity>& all) {
+    Eigen::VectorXd intensities(static_cast<Eigen::Index>(all.size()));
+    for (size_t i = 0; i < all.size(); ++i) {
+      intensities[static_cast<Eigen::Index>(i)] = all[i].intensity;
+    }
+    return likelihood.At(intensities).minus_log;
+  };
+  if (std::all_of(found.begin(), found.end(),
+                  [](const NoiseIntensity& one) { return one.seen || !one.estimated; })) {
+    return false;
+  }
+  double least = minus_log(found) - kLarger;
+  bool any = false;
+  for (const double share : {1.0, 0.1, 0.01, 1e-3}) {
+    std::vector<NoiseIntensity> trial = found;
+    for (NoiseIntensity& one : trial) {
+      if (one.estimated && !one.seen) one.intensity = share * FirstIntensity(one.term, run);
+    }
+    if (const double now = minus_log(trial); now < least) {
+      least = now;
+      *begin = trial;
+      any = true;
+    }
+  }
+  return any;
+}
+
+}  // namespace
+
 bool UpdateIntensities(const FitOptions& options, const FitResult& result,
                        RecordingsProblem* problem, std::vector<NoiseIntensity>* intensities,
                        double* largest, std::string* message, double* minus_log) {
@@ -441,15 +478,24 @@ bool UpdateIntensities(const FitOptions& options, const FitResult& result,
   if (!likelihood.Create(options, result.estimate, NoiseLikelihood::Parameters::kFree, problem,
                          message))
     return false;
+  std::vector<NoiseIntensity> begun = *intensities;
   IntensitySearch search(likelihood, intensities);
   search.Go();
-  if (!search.Intensities().allFinite()) {
+  Eigen::VectorXd found = search.Intensities();
+  if (BeginWhereSeen(likelihood, *problem->run(0), *intensities, &begun)) {
+    IntensitySearch again(likelihood, &begun);
+    again.Go();
+    found = again.Intensities();
+    *intensities = begun;
+    *largest = std::max(*largest, 1.0);
+  }
+  if (!found.allFinite()) {
     *message = "the likelihood of the random forces' intensities is not finite";
     return false;
   }
-  SetAll(search.Intensities(), problem);
+  SetAll(found, problem);
   *largest = std::max(*largest, search.largest());
-  if (minus_log != nullptr) *minus_log = likelihood.At(search.Intensities()).minus_log;
+  if (minus_log != nullptr) *minus_log = likelihood.At(found).minus_log;
   return true;
 }
 

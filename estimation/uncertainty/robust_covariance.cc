@@ -220,20 +220,27 @@ Reduced Reduce(const RecordingRows& rows, const RobustOptions& options) {
   return reduced;
 }
 
-/// s² of equation (5); `parameters` of all recordings.
+/// s² of equation (5); `parameters` of all recordings. Where Huber's loss cuts residuals off the
+/// median tells their size, at least.
 Unseen UnseenOf(const std::vector<RecordingRows>& recordings, const std::vector<Reduced>& reduced,
-                Eigen::Index parameters) {
+                Eigen::Index parameters, const RobustOptions& options) {
   double sum = 0.0;
   Eigen::Index rows = 0;
+  std::vector<double> sizes;
   for (size_t g = 0; g < recordings.size(); ++g) {
     if (!(recordings[g].weight > 0.0)) continue;
     sum += reduced[g].psi.squaredNorm() / recordings[g].weight;
     rows += reduced[g].psi.size();
+    for (const double r : recordings[g].residuals) sizes.push_back(std::abs(r));
   }
   Unseen unseen;
   if (rows > parameters) {
     unseen.freedom = static_cast<double>(rows - parameters);
     unseen.variance = sum / unseen.freedom;
+    if (options.huber > 0.0) {
+      const double size = kDeviationByMedian * Median(std::move(sizes));
+      unseen.variance = std::max(unseen.variance, size * size);
+    }
   }
   return unseen;
 }
@@ -465,7 +472,7 @@ RobustCovariance EstimateRobustCovariance(const std::vector<RecordingRows>& reco
   const RowMatrixXd normal = Decomposition(stacked, options.rank_tolerance).Covariance();
   const double rows = static_cast<double>(stacked_rows);
   const double factor = rows / (rows - static_cast<double>(parameters));
-  const Unseen unseen = UnseenOf(recordings, reduced, parameters);
+  const Unseen unseen = UnseenOf(recordings, reduced, parameters, options);
   // Without shared parameters leaving a recording out moves nothing.
   if (size == 0 || static_cast<int>(recordings.size()) < kFewRecordings ||
       !Jackknife(reduced, recordings, normal, information, options, &result)) {

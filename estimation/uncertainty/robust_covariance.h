@@ -33,7 +33,8 @@
 //
 //   V_g += s² Σ_t Z_tᵀ Z_t,   Z_t = H_t S̃_t A⁻¹,   H_t = S̃_t A⁻¹ S̃_tᵀ + O_t (O_gᵀ O_g)⁺ O_tᵀ    (5)
 //
-// is added, with s² = Σ ψ² / (N − P), of N − P degrees of freedom.
+// is added, with s² = Σ ψ² / (N − P), of N − P degrees of freedom, or with Huber's loss what the
+// median of the residuals says, if that is more.
 //
 // S follows Andrews: a first-order autoregression (ρ_k, σ_k) of each u_k gives the width 1.1447 (α
 // T)^(1/3) samples, α = Σ_k 4 ρ_k² / ((1 − ρ_k)⁶ (1 + ρ_k)²) / Σ_k 1 / (1 − ρ_k)⁴ with u_k scaled

@@ -359,6 +359,9 @@ constexpr char kStartsOffItsJoints[] =
 constexpr char kDriftsOffItsJoints[] =
     "joints drift by more than a tenth of their arms in one motion: dt is too large";
 
+constexpr char kThrown[] =
+    "contacts nearly contradict each other, and throw bodies out in one motion: dt is too large";
+
 std::string NotProjected(double allowed, double error, bool starts) {
   char text[256];
   std::snprintf(text, sizeof(text),
@@ -465,6 +468,39 @@ void SetUpProjection(const Segment& segment, const State<double>& state, Impulse
   }
 }
 
+namespace {
+
+// Whether the projection of twists takes from a body of several contacts more than all speeds, and
+// what loads give in the motion. Where contacts nearly contradict each other, as in a wall of bricks
+// of which one has moved, their forces throw bodies out between two solves, and the projection and
+// the correction of poses put these down elsewhere.
+bool IsThrown(const Model<double>& model, const Lengths& lengths, const Segment& segment) {
+  constexpr size_t kFewContacts = 3;
+  constexpr double kThrownWay = 1e-6;
+  if (segment.contacts.size() < kFewContacts || segment.num_stages == 0) return false;
+  const ModelStructure& s = *model.structure;
+  double usual = 0.0, taken = 0.0;
+  for (int stage = 0; stage < segment.num_stages; ++stage) {
+    usual = std::max(usual, segment.length * LoadAcceleration(segment.stages[stage].problem));
+  }
+  for (int block = 0; block < s.num_blocks(); ++block) {
+    const size_t body = 3 * static_cast<size_t>(s.moving[block]);
+    const double* projected = &segment.projection.solution.motion[3 * static_cast<size_t>(block)];
+    for (int i = 0; i < 2; ++i) {
+      const double speed = projected[i];
+      usual = std::max({usual, std::abs(segment.before.twist[body + i]), std::abs(speed)});
+      taken = std::max(taken, std::abs(segment.after.twist[body + i] - speed));
+    }
+  }
+  for (const PathIndex& path : s.paths) {
+    const double* twist = &segment.before.twist[3 * static_cast<size_t>(path.body)];
+    usual = std::max({usual, std::abs(twist[0]), std::abs(twist[1]), std::abs(twist[2])});
+  }
+  return taken > usual && segment.length * taken > kThrownWay * lengths.smallest_radius();
+}
+
+}  // namespace
+
 bool SegmentFlow::ProjectTwists(const Model<double>& model, Segment* segment,
                                 std::string* message) {
   const std::vector<SupportState>& supports = segment->before.supports;
@@ -509,6 +545,10 @@ bool SegmentFlow::ProjectTwists(const Model<double>& model, Segment* segment,
           : -1;
   if (joint >= 0) {
     *message = NameOfContradicted(*model.structure, joint);
+    return false;
+  }
+  if (!segment->starts && IsThrown(model, lengths_, *segment)) {
+    *message = kThrown;
     return false;
   }
   SpreadTwists(*model.structure, projection.solution.motion, &segment->after.twist);

@@ -7,6 +7,7 @@
 #include <Eigen/QR>
 #include <cmath>
 #include <random>
+#include <tuple>
 
 #include "tangible/estimation/uncertainty/decomposition.h"
 
@@ -173,35 +174,35 @@ TEST(RobustCovarianceTest, KernelAndFreedomAreTheirSums) {
 TEST(RobustCovarianceTest, CoversWhatASingleSampleDecides) {
   constexpr int kReplicas = 400;
   constexpr int kSamples = 20;
-  for (const bool both_coordinates : {false, true}) {
-    for (const double noise : {1.0, 3.0}) {
-      std::mt19937 random(5);
-      std::normal_distribution<double> normal(0.0, noise);
-      double covered = 0.0;
-      for (int replica = 0; replica < kReplicas; ++replica) {
-        RecordingRows rows;
-        rows.shared = RowMatrixXd::Zero(2 * kSamples, 1);
-        rows.own = RowMatrixXd::Zero(2 * kSamples, 1);
-        Eigen::VectorXd error(2 * kSamples);
-        for (int i = 0; i < 2 * kSamples; ++i) {
-          rows.times.push_back(0.1 * (i / 2));
-          if (i % 2 == 0) rows.own(i, 0) = 1.0;
-          error[i] = normal(random);
-        }
-        rows.shared(2 * kSamples - 2, 0) = both_coordinates ? 0.5 : 0.0;
-        rows.shared(2 * kSamples - 1, 0) = 1.0;
-        RowMatrixXd all(2 * kSamples, 2);
-        all << rows.shared, rows.own;
-        const Eigen::Vector2d moved = all.colPivHouseholderQr().solve(error);
-        rows.residuals = error - all * moved;
-        const RobustCovariance robust =
-            EstimateRobustCovariance({rows}, RowMatrixXd(0, 1), RobustOptions());
-        const double half =
-            StudentQuantile(robust.shared_freedom[0]) * std::sqrt(robust.shared(0, 0));
-        covered += std::abs(moved[0]) < half ? 1.0 / kReplicas : 0.0;
+  for (const auto& [both_coordinates, noise, huber] :
+       {std::tuple{false, 1.0, 0.0}, std::tuple{true, 1.0, 0.0}, std::tuple{true, 3.0, 0.0},
+        std::tuple{false, 3.0, 1.0}}) {
+    std::mt19937 random(5);
+    std::normal_distribution<double> normal(0.0, noise);
+    double covered = 0.0;
+    for (int replica = 0; replica < kReplicas; ++replica) {
+      RecordingRows rows;
+      rows.shared = RowMatrixXd::Zero(2 * kSamples, 1);
+      rows.own = RowMatrixXd::Zero(2 * kSamples, 1);
+      Eigen::VectorXd error(2 * kSamples);
+      for (int i = 0; i < 2 * kSamples; ++i) {
+        rows.times.push_back(0.1 * (i / 2));
+        if (i % 2 == 0) rows.own(i, 0) = 1.0;
+        error[i] = normal(random);
       }
-      EXPECT_NEAR(covered, 0.95, kSpread) << both_coordinates << " " << noise;
+      rows.shared(2 * kSamples - 2, 0) = both_coordinates ? 0.5 : 0.0;
+      rows.shared(2 * kSamples - 1, 0) = 1.0;
+      RowMatrixXd all(2 * kSamples, 2);
+      all << rows.shared, rows.own;
+      const Eigen::Vector2d moved = all.colPivHouseholderQr().solve(error);
+      rows.residuals = error - all * moved;
+      const RobustCovariance robust =
+          EstimateRobustCovariance({rows}, RowMatrixXd(0, 1), {.huber = huber});
+      const double half =
+          StudentQuantile(robust.shared_freedom[0]) * std::sqrt(robust.shared(0, 0));
+      covered += std::abs(moved[0]) < half ? 1.0 / kReplicas : 0.0;
     }
+    EXPECT_NEAR(covered, 0.95, kSpread) << both_coordinates << " " << noise << " " << huber;
   }
 }
 

@@ -351,5 +351,28 @@ TEST(PilesByEventsTest, AContactThatJamsAtItsLimitOpens) {
   }
 }
 
+// A wall of bricks whose sides touch, of which one moves at 1e-6 m/s: no other one goes farther than
+// that takes it. The rows of its contacts nearly contradict each other.
+TEST(PilesByEventsTest, NoBrickOfAWallIsThrownOut) {
+  Scene scene = Empty(Integrator::kRungeKutta4, 0.01);
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < (row == 1 ? 3 : 4); ++column) {
+      BasicBody<double> brick =
+          Moving("b" + std::to_string(row) + std::to_string(column), {ShapeType::kBox, {0.4, 0.2}},
+                 0.4 * column + (row == 1 ? 0.2 : 0.0), 0.1 + 0.2 * row);
+      brick.mass = 2.0;
+      if (row == 1 && column == 1) brick.velocity = {-1e-6, 0.0};
+      scene.bodies.push_back(brick);
+    }
+  }
+  const Fallen run = RunOf(scene);
+  ASSERT_EQ(run.report.status, StepStatus::kDone) << run.report.message;
+  for (size_t i = 1; i < scene.bodies.size(); ++i) {
+    EXPECT_NEAR(run.final.pose[3 * i], scene.bodies[i].position.x(), 1e-7) << i;
+    EXPECT_NEAR(run.final.pose[3 * i + 1], scene.bodies[i].position.y(), 1e-7) << i;
+    EXPECT_NEAR(run.final.pose[3 * i + 2], 0.0, 1e-6) << i;
+  }
+}
+
 }  // namespace
 }  // namespace tangible
