@@ -104,9 +104,13 @@ void RolloutCertifier::OneSided(const std::string& reason) {
 void RolloutCertifier::AddMargin(double margin, const Place& place, const std::string& what,
                                  AtKink at_kink) {
   step_margin_ = std::min(step_margin_, std::max(margin, 0.0));
-  if (at_kink == AtKink::kNo && margin < margin_beside_) {
+  if (at_kink != AtKink::kYes && margin < margin_beside_) {
     margin_beside_ = std::max(margin, 0.0);
     beside_where_ = place.Text() + ", " + what;
+  }
+  if (at_kink != AtKink::kOfFeatures && margin < margin_but_features_) {
+    margin_but_features_ = std::max(margin, 0.0);
+    where_but_features_ = place.Text() + ", " + what;
   }
   if (margin < certificate_.margin_min) {
     certificate_.margin_min = std::max(margin, 0.0);
@@ -264,8 +268,11 @@ void RolloutCertifier::AddFeatures(const Model<double>& model, const StepRecord&
     if (record.h == 0.0 && !(ApproachOf(record, first, last) > kLoaded * approach)) continue;
     const Place place{model.structure.get(),       step, record.time, first, &contacts[first],
                       record.solution.modes[first]};
-    AddMargin(FeatureChangeMargin(model, record, first, last, system), place,
-              "where another corner or edge takes over");
+    const double margin = FeatureChangeMargin(model, record, first, last, system);
+    if (record.h > 0.0 && margin < kNearKinkMargin) {
+      feature_ties_.push_back({step, contacts[first].a, contacts[first].b});
+    }
+    AddMargin(margin, place, "where another corner or edge takes over", AtKink::kOfFeatures);
   }
 }
 
@@ -709,6 +716,10 @@ Certificate CertifyDerivative(const Model<double>& model, const State<double>& i
       model.structure->settings.stepping == Stepping::kFixed &&
       HasOneDerivative(model, initial, directions, sizes)) {
     certifier.LeaveOutKinks(&certificate);
+  }
+  if (certificate.degenerate_rows == 0 && report.status == StepStatus::kDone &&
+      model.structure->settings.stepping == Stepping::kFixed) {
+    certifier.LeaveOutFeatures(model, initial, &certificate);
   }
   // Residuals of single solves do not show the digits that an ill-conditioned sequence of them
   // loses, nor how successive impacts multiply rounding.

@@ -57,6 +57,12 @@ struct CertifyOptions {
   std::vector<std::string> names;
 };
 
+/// Two bodies near a change of the corners and edges of their contact, before a fixed step.
+struct FeatureTie {
+  long step = 0;
+  int a = -1, b = -1;
+};
+
 /// Collects the certificate step by step.
 class RolloutCertifier {
  public:
@@ -74,10 +80,14 @@ class RolloutCertifier {
   /// After Finish: leaves out of a certificate the contacts that are exactly at a kink, fixed steps
   /// only. For directions that move none of them.
   void LeaveOutKinks(Certificate* certificate) const;
+  /// Leaves out changes of corners and edges, by fixed steps, that no direction moves; whether there
+  /// are such alone.
+  bool LeaveOutFeatures(const Model<double>& model, const State<double>& initial,
+                        Certificate* certificate) const;
 
  private:
   struct Place;
-  enum class AtKink { kNo, kYes };
+  enum class AtKink { kNo, kYes, kOfFeatures };
   void AddMargin(double margin, const Place& place, const std::string& what,
                  AtKink at_kink = AtKink::kNo);
   void AddJump(double margin, const Place& place, const std::string& what);
@@ -200,6 +210,9 @@ class RolloutCertifier {
     }
   };
   LastSystem last_;
+  std::vector<FeatureTie> feature_ties_;  ///< by step
+  double margin_but_features_ = std::numeric_limits<double>::infinity();
+  std::string where_but_features_;
   int last_redundant_ = 0;
   // For event stepping: contacts that carry a force, the bodies that the last impact moved, and
   // when.

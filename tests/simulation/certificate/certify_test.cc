@@ -230,6 +230,33 @@ TEST(CertifyDerivativeTest, SaysThatADirectionContradictsRedundantRows) {
   }
 }
 
+// Two equal boxes that are pushed along side by side: their corners are level with each other, and
+// another one takes over as soon as one box turns. Pushes and masses turn none.
+TEST(CertifyDerivativeTest, AChangeOfCornersThatNoDirectionMovesIsLeftOut) {
+  const Scene scene = SceneOf(R"({"gravity": [0, 0], "bodies": [
+      {"name": "a", "shape": {"box": {"size": [0.5, 0.5]}}, "mass": 1, "position": [0, 0]},
+      {"name": "b", "shape": {"box": {"size": [0.5, 0.5]}}, "mass": 2, "position": [0.5, 0]}],
+    "forces": [{"name": "push", "body": "b", "force": [-2, 0]}],
+    "simulation": {"dt": 0.1, "duration": 0.6}})");
+  Model<double> model;
+  State<double> initial;
+  BuildModel(scene, &model, &initial);
+  for (const auto& [path, trusted] :
+       {std::pair{"bodies/b/mass", true}, std::pair{"forces/push/force/x", true},
+        std::pair{"bodies/b/velocity/x", true}, std::pair{"bodies/b/angle", false},
+        std::pair{"bodies/a/shape/size/y", false}}) {
+    ParameterPath parameter;
+    std::string error;
+    ASSERT_TRUE(ResolveParameter(scene, path, &parameter, &error)) << error;
+    const std::string verdict =
+        CertifyDerivative(
+            model, initial,
+            RowMatrixXd(VariableJacobian(scene, model.structure, {DirectionOf(parameter)})), {path})
+            .verdict;
+    EXPECT_EQ(verdict == "trustworthy", trusted) << path << ": " << verdict;
+  }
+}
+
 // Two boxes side by side that slide together: friction between them shifts their weight from one to
 // the other, which their equal friction on the floor does not show. The derivative by the friction
 // of one of them is that of its share; by both, and by the push, there is one.
