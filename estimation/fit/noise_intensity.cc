@@ -24,8 +24,6 @@ constexpr double kDifference = 0.05;
 constexpr double kChordStep = 0.2;
 // Smoothings at the initial parameters before the first fit.
 constexpr int kRoundsAtStart = 4;
-// Of the first intensity, where the search begins without forces.
-constexpr double kNextToNone = 1e-4;
 // A deviation of ln s above which no force is seen: a factor of 1e4 changes nothing.
 constexpr double kUnseen = 9.2;
 
@@ -455,7 +453,9 @@ bool BeginWhereSeen(const NoiseLikelihood& likelihood, const RolloutResiduals& r
   }
   double least = minus_log(found) - kLarger;
   bool any = false;
-  for (const double share : {1.0, 0.1, 0.01, 1e-3}) {
+  constexpr int kDecades = 4;
+  double share = 1.0;
+  for (int decade = 0; decade < kDecades; ++decade, share *= 0.1) {
     std::vector<NoiseIntensity> trial = found;
     for (NoiseIntensity& one : trial) {
       if (one.estimated && !one.seen) one.intensity = share * FirstIntensity(one.term, run);

@@ -102,6 +102,8 @@ inline constexpr double kSettledChange = 1e-3;
 /// Of the derivative of ln L by ln s: an intensity s that the likelihood pulls by less has no
 /// effect on it where it has no curvature either.
 inline constexpr double kUnseenScore = 1e-2;
+/// Of the first intensity of a random force: where the search begins without forces.
+inline constexpr double kNextToNone = 1e-4;
 /// Of a parameter's deviation at the others held: the distance of the differences of the random
 /// forces' determinant.
 inline constexpr double kSlopeDistance = 0.1;

@@ -43,7 +43,8 @@
 // prior is a measurement of known deviation: it adds A⁻¹ A_prior A⁻¹, whose degrees of freedom are
 // infinite. An interval is ± the 0.975 quantile of Student's t with ν_k degrees of freedom.
 //
-// Own parameters of a recording have (4) and (5) of O_g⁺ ψ alone, and D_g V D_gᵀ of the shared ones.
+// Own parameters of a recording have (4) and (5) of O_g⁺ ψ alone, and D_g V D_gᵀ of the shared
+// ones.
 //
 // References: D. W. K. Andrews, Econometrica 59 (1991) 817, eqs. (5.1), (6.2), (6.4); W. K. Newey
 // and K. D. West, Econometrica 55 (1987) 703; N. M. Kiefer and T. J. Vogelsang, Econometric Theory

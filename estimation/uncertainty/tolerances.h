@@ -17,7 +17,7 @@ inline constexpr double kDifferencesRank = 1e-6;
 inline constexpr double kJackknifeRank = 1e-12;
 /// Of sigma: a parameter whose change by its own magnitude moves the residuals by less, to first
 /// order, has no effect at the estimate: its derivative is rounding, as where the cost is flat.
-inline constexpr double kNoDerivative = 1e-9;
+inline constexpr double kRoundingColumn = 1e-9;
 /// Of the largest share of a direction: a parameter with a smaller share does not belong to the
 /// direction, because smaller shares are rounding and errors of derivatives.
 inline constexpr double kSmallShare = 1e-4;

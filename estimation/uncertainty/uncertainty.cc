@@ -179,7 +179,7 @@ class Estimator {
   bool HasNoEffect(int parameter, double square) const {
     const double magnitude =
         std::max(std::abs(estimate_[parameter]), entries_[static_cast<size_t>(parameter)].scale);
-    return magnitude * std::sqrt(square) < kNoDerivative;
+    return magnitude * std::sqrt(square) < kRoundingColumn;
   }
 
   /// Eliminates the own parameters from the rows of each block and decomposes the rest.

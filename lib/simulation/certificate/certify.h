@@ -80,8 +80,8 @@ class RolloutCertifier {
   /// After Finish: leaves out of a certificate the contacts that are exactly at a kink, fixed steps
   /// only. For directions that move none of them.
   void LeaveOutKinks(Certificate* certificate) const;
-  /// Leaves out changes of corners and edges, by fixed steps, that no direction moves; whether there
-  /// are such alone.
+  /// Leaves out changes of corners and edges, by fixed steps, that no direction moves; whether
+  /// there are such alone.
   bool LeaveOutFeatures(const Model<double>& model, const State<double>& initial,
                         Certificate* certificate) const;
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Changes of corners and edges, by fixed steps, that no direction moves: equal boxes that are pushed
-// along side by side do not turn against each other, whatever the push.
+// Changes of corners and edges, by fixed steps, that no direction moves: equal boxes that are
+// pushed along side by side do not turn against each other, whatever the push.
 
 #include <algorithm>
 #include <cmath>

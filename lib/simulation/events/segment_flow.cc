@@ -471,12 +471,11 @@ void SetUpProjection(const Segment& segment, const State<double>& state, Impulse
 namespace {
 
 // Whether the projection of twists takes from a body of several contacts more than all speeds, and
-// what loads give in the motion. Where contacts nearly contradict each other, as in a wall of bricks
-// of which one has moved, their forces throw bodies out between two solves, and the projection and
-// the correction of poses put these down elsewhere.
+// what loads give in the motion. Where contacts nearly contradict each other, as in a wall of
+// bricks of which one has moved, their forces throw bodies out between two solves, and the
+// projection and the correction of poses put these down elsewhere.
 bool IsThrown(const Model<double>& model, const Lengths& lengths, const Segment& segment) {
   constexpr size_t kFewContacts = 3;
-  constexpr double kThrownWay = 1e-6;
   if (segment.contacts.size() < kFewContacts || segment.num_stages == 0) return false;
   const ModelStructure& s = *model.structure;
   double usual = 0.0, taken = 0.0;

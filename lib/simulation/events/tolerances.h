@@ -243,6 +243,9 @@ inline constexpr double kSupportDecay = 0.5;
 inline constexpr double kStoppedTurn = 1e-9;
 /// Rad/s: slower is what rounding leaves of rounding; its square has no digits.
 inline constexpr double kNoTurn = 1e-150;
+/// Of the smallest body's radius: a way that the projection of twists takes from a body in a motion
+/// does no harm where it is shorter.
+inline constexpr double kThrownWay = 1e-6;
 /// Of dt / 2^k: motions at supports end at multiples of it, up to the rounding of a time.
 inline constexpr double kSupportGridSlack = 1e-3;
 /// The norm of the difference of two unit vectors: the direction in which a point of a support

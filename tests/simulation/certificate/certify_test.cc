@@ -205,6 +205,20 @@ TEST(CertifyRollout, CountsRedundantRows) {
   EXPECT_LT(c.linear_residual, 1e-12);
 }
 
+// Of the derivative along one parameter.
+Certificate CertifyAlong(const Scene& scene, const std::string& path) {
+  ParameterPath parameter;
+  std::string error;
+  EXPECT_TRUE(ResolveParameter(scene, path, &parameter, &error)) << error;
+  Model<double> model;
+  State<double> initial;
+  BuildModel(scene, &model, &initial);
+  return CertifyDerivative(
+      model, initial,
+      RowMatrixXd(VariableJacobian(scene, model.structure, {DirectionOf(parameter)})), {path},
+      {1.0});
+}
+
 // Of two floors under one ball one cannot rise alone; both can.
 TEST(CertifyDerivativeTest, SaysThatADirectionContradictsRedundantRows) {
   const Scene scene = SceneOf(R"({"bodies": [
@@ -212,18 +226,10 @@ TEST(CertifyDerivativeTest, SaysThatADirectionContradictsRedundantRows) {
       {"name": "floor", "static": true, "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}},
       {"name": "again", "static": true, "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
       "simulation": {"dt": 0.01, "duration": 0.05}})");
-  Model<double> model;
-  State<double> initial;
-  BuildModel(scene, &model, &initial);
   for (const auto& [path, reason] :
        {std::pair{"bodies/floor/shape/offset", kContradictingRows},
         std::pair{"bodies/*/shape/offset", ""}, std::pair{"bodies/ball/mass", ""}}) {
-    ParameterPath parameter;
-    std::string error;
-    ASSERT_TRUE(ResolveParameter(scene, path, &parameter, &error)) << error;
-    const Certificate c = CertifyDerivative(
-        model, initial,
-        RowMatrixXd(VariableJacobian(scene, model.structure, {DirectionOf(parameter)})), {path});
+    const Certificate c = CertifyAlong(scene, path);
     EXPECT_EQ(c.redundant_rows, 5) << path;
     EXPECT_EQ(c.one_sided, reason) << path;
     EXPECT_EQ(c.verdict == "trustworthy", c.one_sided.empty()) << c.verdict;
@@ -238,21 +244,11 @@ TEST(CertifyDerivativeTest, AChangeOfCornersThatNoDirectionMovesIsLeftOut) {
       {"name": "b", "shape": {"box": {"size": [0.5, 0.5]}}, "mass": 2, "position": [0.5, 0]}],
     "forces": [{"name": "push", "body": "b", "force": [-2, 0]}],
     "simulation": {"dt": 0.1, "duration": 0.6}})");
-  Model<double> model;
-  State<double> initial;
-  BuildModel(scene, &model, &initial);
   for (const auto& [path, trusted] :
        {std::pair{"bodies/b/mass", true}, std::pair{"forces/push/force/x", true},
         std::pair{"bodies/b/velocity/x", true}, std::pair{"bodies/b/angle", false},
         std::pair{"bodies/a/shape/size/y", false}}) {
-    ParameterPath parameter;
-    std::string error;
-    ASSERT_TRUE(ResolveParameter(scene, path, &parameter, &error)) << error;
-    const std::string verdict =
-        CertifyDerivative(
-            model, initial,
-            RowMatrixXd(VariableJacobian(scene, model.structure, {DirectionOf(parameter)})), {path})
-            .verdict;
+    const std::string verdict = CertifyAlong(scene, path).verdict;
     EXPECT_EQ(verdict == "trustworthy", trusted) << path << ": " << verdict;
   }
 }
@@ -273,19 +269,11 @@ TEST(CertifyDerivativeTest, SaysThatSharedLoadsLeaveAFrictionUndetermined) {
         "forces": [{"name": "push", "body": "a", "force": [30, 0]}],
         "simulation": {"stepping": ")" +
                                 std::string(stepping) + R"(", "dt": 0.03125, "duration": 0.1}})");
-    Model<double> model;
-    State<double> initial;
-    BuildModel(scene, &model, &initial);
     for (const auto& [path, reason] :
          {std::pair{"bodies/a/friction", kUndeterminedFriction},
           std::pair{"bodies/b/friction", kUndeterminedFriction}, std::pair{"bodies/*/friction", ""},
           std::pair{"forces/push/force/x", ""}}) {
-      ParameterPath parameter;
-      std::string error;
-      ASSERT_TRUE(ResolveParameter(scene, path, &parameter, &error)) << error;
-      const Certificate c = CertifyDerivative(
-          model, initial,
-          RowMatrixXd(VariableJacobian(scene, model.structure, {DirectionOf(parameter)})), {path});
+      const Certificate c = CertifyAlong(scene, path);
       EXPECT_EQ(c.one_sided, reason) << stepping << " " << path << " " << c.verdict;
     }
   }
@@ -304,18 +292,7 @@ TEST(CertifyDerivativeTest, AKinkThatNoDirectionMovesIsLeftOut) {
               {"bodies": ["slides", "floor"], "friction": 0.25}],
     "forces": [{"name": "push", "body": "still", "force": [4, 0]}],
     "simulation": {"dt": 0.0625, "duration": 0.25}})");
-  const auto certify = [&scene](const std::string& path) {
-    ParameterPath parameter;
-    std::string error;
-    EXPECT_TRUE(ResolveParameter(scene, path, &parameter, &error)) << error;
-    Model<double> model;
-    State<double> initial;
-    BuildModel(scene, &model, &initial);
-    return CertifyDerivative(
-        model, initial,
-        RowMatrixXd(VariableJacobian(scene, model.structure, {DirectionOf(parameter)})), {path},
-        {1.0});
-  };
+  const auto certify = [&scene](const std::string& path) { return CertifyAlong(scene, path); };
   for (const char* path : {"bodies/slides/velocity/x", "pairs/slides:floor/friction",
                            "bodies/slides/mass", "bodies/still/position/x"}) {
     const Certificate c = certify(path);

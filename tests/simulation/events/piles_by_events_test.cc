@@ -351,8 +351,8 @@ TEST(PilesByEventsTest, AContactThatJamsAtItsLimitOpens) {
   }
 }
 
-// A wall of bricks whose sides touch, of which one moves at 1e-6 m/s: no other one goes farther than
-// that takes it. The rows of its contacts nearly contradict each other.
+// A wall of bricks whose sides touch, of which one moves at 1e-6 m/s: no other one goes farther
+// than that takes it. The rows of its contacts nearly contradict each other.
 TEST(PilesByEventsTest, NoBrickOfAWallIsThrownOut) {
   Scene scene = Empty(Integrator::kRungeKutta4, 0.01);
   for (int row = 0; row < 3; ++row) {
