@@ -264,7 +264,7 @@ class OutlinePair {
 }  // namespace
 
 Vector2<double> NearerNormal(const Outline& outline, int run, const Vector2<double>& x) {
-  const Vector2<double> none(0.0, 0.0);
+  Vector2<double> none(0.0, 0.0);
   const OutlineRun& of = outline.run(run);
   const double s = of.tangent.dot(x - of.start);
   const double depth = -of.normal.dot(x - of.start);

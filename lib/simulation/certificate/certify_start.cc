@@ -75,6 +75,23 @@ double Acceleration(const Model<double>& model, const Segment* segment) {
   return largest;
 }
 
+// The contacts that may touch at a state, and all limits, with their gaps.
+void FindNear(const Model<double>& model, const State<double>& state, EventSearch* search,
+              std::vector<ActiveContact>* contacts) {
+  double reach = 0.0;
+  for (int body = 0; body < model.structure->num_bodies(); ++body) {
+    reach = std::max(reach, search->lengths().Touch(state, body, body));
+  }
+  search->FindContacts(model, state, reach, contacts);
+  const size_t shapes = contacts->size();
+  AppendLimits(model, state, contacts);
+  for (size_t k = shapes; k < contacts->size(); ++k) {
+    ContactRows<double> rows;
+    EvaluateActiveRows(model, state, (*contacts)[k], &rows);
+    (*contacts)[k].gap = rows.geometry.gap;
+  }
+}
+
 // Among contacts that touch, those that may jam, and those that touch a body of one of them,
 // because changes of their impulses are transmitted to it.
 std::vector<ActiveContact> ThatMayJam(const Model<double>& model, const State<double>& start,
@@ -172,20 +189,7 @@ void RolloutCertifier::AddStart(const Model<double>& model, const EventRecord& r
   const size_t loaded = touching.size();
   EventSearch search(model);
   std::vector<ActiveContact> unloaded;
-  if (start != nullptr) {
-    double reach = 0.0;
-    for (int body = 0; body < model.structure->num_bodies(); ++body) {
-      reach = std::max(reach, search.lengths().Touch(*start, body, body));
-    }
-    search.FindContacts(model, *start, reach, &unloaded);
-    const size_t shapes = unloaded.size();
-    AppendLimits(model, *start, &unloaded);
-    for (size_t k = shapes; k < unloaded.size(); ++k) {
-      ContactRows<double> rows;
-      EvaluateActiveRows(model, *start, unloaded[k], &rows);
-      unloaded[k].gap = rows.geometry.gap;
-    }
-  }
+  if (start != nullptr) FindNear(model, *start, &search, &unloaded);
   for (const ActiveContact& contact : unloaded) {
     if (contact.gap <= search.TouchTolerance(model, *start, contact) &&
         std::none_of(touching.begin(), touching.begin() + static_cast<std::ptrdiff_t>(loaded),
