@@ -355,6 +355,7 @@ TEST(PilesByEventsTest, AContactThatJamsAtItsLimitOpens) {
 // than that takes it. The rows of its contacts nearly contradict each other.
 TEST(PilesByEventsTest, NoBrickOfAWallIsThrownOut) {
   Scene scene = Empty(Integrator::kRungeKutta4, 0.01);
+  scene.gravity = Vector2<double>(0.0, -10.0);
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < (row == 1 ? 3 : 4); ++column) {
       BasicBody<double> brick =
