@@ -29,6 +29,14 @@ constexpr double kUnseen = 9.2;
 
 double Quantile95() { return 1.959963984540054; }
 
+Eigen::VectorXd VectorOf(const std::vector<NoiseIntensity>& all) {
+  Eigen::VectorXd intensities(static_cast<Eigen::Index>(all.size()));
+  for (size_t i = 0; i < all.size(); ++i) {
+    intensities[static_cast<Eigen::Index>(i)] = all[i].intensity;
+  }
+  return intensities;
+}
+
 void SetAll(const Eigen::VectorXd& intensities, RecordingsProblem* problem) {
   for (int b = 0; b < problem->num_blocks(); ++b) {
     problem->run(b)->noise()->SetIntensities(intensities);
@@ -260,11 +268,7 @@ void BeginIntensities(RecordingsProblem* problem) { BeginAt(1.0, problem); }
 void BeginWithoutForces(RecordingsProblem* problem) { BeginAt(kNextToNone, problem); }
 
 void SetIntensities(const std::vector<NoiseIntensity>& intensities, RecordingsProblem* problem) {
-  Eigen::VectorXd all(static_cast<Eigen::Index>(intensities.size()));
-  for (size_t i = 0; i < intensities.size(); ++i) {
-    all[static_cast<Eigen::Index>(i)] = intensities[i].intensity;
-  }
-  SetAll(all, problem);
+  SetAll(VectorOf(intensities), problem);
 }
 
 namespace {
@@ -441,11 +445,7 @@ bool BeginWhereSeen(const NoiseLikelihood& likelihood, const RolloutResiduals& r
                     const std::vector<NoiseIntensity>& found, std::vector<NoiseIntensity>* begin) {
   constexpr double kLarger = 0.5;  // nats
   const auto minus_log = [&](const std::vector<NoiseIntensity>& all) {
-    Eigen::VectorXd intensities(static_cast<Eigen::Index>(all.size()));
-    for (size_t i = 0; i < all.size(); ++i) {
-      intensities[static_cast<Eigen::Index>(i)] = all[i].intensity;
-    }
-    return likelihood.At(intensities).minus_log;
+    return likelihood.At(VectorOf(all)).minus_log;
   };
   if (std::all_of(found.begin(), found.end(),
                   [](const NoiseIntensity& one) { return one.seen || !one.estimated; })) {

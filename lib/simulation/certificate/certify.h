@@ -252,8 +252,8 @@ class RolloutCertifier {
   std::vector<BesideJump> beside_jumps_;
   // The three of all islands, while closed_, loaded_ and struck_at_ are those of one.
   std::vector<ActiveContact> all_closed_, all_loaded_;
-  std::vector<ActiveContact>
-      touching_at_start_;  ///< of fixed steps those that may close in the first
+  /// Contacts that touch as the run starts; of fixed steps those that may close in the first one.
+  std::vector<ActiveContact> touching_at_start_;
   std::vector<double> all_struck_at_;
   const IslandRecord* island_ = nullptr;  ///< whose bodies and numbers are looked at
   RowMatrixXd own_directions_;            ///< the directions of its variables

@@ -132,8 +132,8 @@ class GrazeFinder {
     const GapCourse start = CourseAt(model_, motion.before, segment.event_contact);
     const GapCourse end = CourseAt(model_, segment.after, segment.event_contact);
     // The last rebounds of a body that comes to rest are slow, but they are not grazing.
-    const double touch = search_.TouchTolerance(model_, motion.before, segment.event_contact);
-    const bool from_above = start.gap > touch;
+    const bool from_above =
+        start.gap > search_.TouchTolerance(model_, motion.before, segment.event_contact);
     const double gained =
         from_above && motion.length > 0.0
             ? std::abs(end.speed - start.speed) / motion.length * model_.structure->settings.dt
@@ -144,9 +144,7 @@ class GrazeFinder {
     // What would turn around within a step; a parabola tells nothing of a longer way.
     const bool near = turns > 0.0 && -end.speed <= turns * model_.structure->settings.dt;
     const double depth = near ? 0.5 * end.speed * end.speed / turns : HUGE_VAL;
-    // What would not go deeper than the tolerance of a touch may as well not touch.
-    const double margin = depth - end.gap <= touch ? 0.0 : ratio * ratio;
-    List({margin, 0.0, segment.event_contact, true, depth}, segment);
+    List({ratio * ratio, 0.0, segment.event_contact, true, depth}, segment);
   }
 
   void AddMiss(const Segment& segment, const ActiveContact& contact) {
