@@ -227,6 +227,7 @@ class RolloutCertifier {
   /// Contacts of the whole model that the last motions held, until when; without those that their
   /// events opened or handed over.
   std::vector<Strike> held_;
+  double missed_ = 0.0;              ///< by all motions until now (certify_grazing.h)
   std::vector<Strike> stuck_;        ///< the same of those that stuck as another one was lifted off
   std::vector<Strike> strikes_;      ///< of the last impact, and of those shortly before it
   std::vector<Strike> slips_ended_;  ///< of the last instant at which contacts stopped sliding

@@ -709,6 +709,7 @@ void RolloutCertifier::AddIsland(const Model<double>& model, long step, EventDer
     }
     AddSegment(model, step, derivative, &part.segment);
     if (part.segment.length > 0.0) impact_ = nullptr;
+    missed_ = std::min(missed_ + MissedBy(part.segment), kMostMissed);
     if (part.segment.IsEventLocated()) {
       const int count = located.Add(part.segment.event_contact);
       last = count > most ? &part.segment : last;
@@ -725,7 +726,7 @@ void RolloutCertifier::AddIsland(const Model<double>& model, long step, EventDer
     AddMargin(0.0, place, "one of " + std::to_string(most) + " events in a step");
   }
   std::vector<Graze> grazes;
-  FindGrazes(model, record, kNearKinkMargin, &grazes);
+  FindGrazes(model, record, kNearKinkMargin, missed_, &grazes);
   for (const Graze& graze : grazes) {
     const Place place{model.structure.get(), step, graze.time, 0, &graze.contact,
                       ContactMode::kOpen};

@@ -61,8 +61,8 @@ bool HasGap(const ActiveContact& contact) {
 
 class GrazeFinder {
  public:
-  GrazeFinder(const Model<double>& model, double most, std::vector<Graze>* grazes)
-      : model_(model), search_(model), most_(most), grazes_(*grazes) {}
+  GrazeFinder(const Model<double>& model, double most, double missed, std::vector<Graze>* grazes)
+      : model_(model), search_(model), most_(most), missed_(missed), grazes_(*grazes) {}
 
   void Add(const Segment& segment) {
     if (segment.event == EventKind::kTouch && HasGap(segment.event_contact) &&
@@ -144,7 +144,8 @@ class GrazeFinder {
     // What would turn around within a step; a parabola tells nothing of a longer way.
     const bool near = turns > 0.0 && -end.speed <= turns * model_.structure->settings.dt;
     const double depth = near ? 0.5 * end.speed * end.speed / turns : HUGE_VAL;
-    List({ratio * ratio, 0.0, segment.event_contact, true, depth}, segment);
+    const double margin = std::min(ratio * ratio, MarginOfMissed(segment.event_contact, depth));
+    List({margin, 0.0, segment.event_contact, true, depth}, segment);
   }
 
   void AddMiss(const Segment& segment, const ActiveContact& contact) {
@@ -161,7 +162,15 @@ class GrazeFinder {
         std::max(0.5 * start.speed * start.speed / acceleration, 0.5 * acceleration * dt * dt);
     // A minimum just below 0 is rounding: the bodies did not touch.
     const double least = std::abs(Least(start, end, segment.length));
-    List({least / height, 0.0, contact, false, least}, segment);
+    List({std::min(least / height, MarginOfMissed(contact, least)), 0.0, contact, false, least},
+         segment);
+  }
+
+  // Below the limit of margins where the motions may have missed so much.
+  double MarginOfMissed(const ActiveContact& contact, double slack) const {
+    const bool is_angle = contact.joint >= 0 && model_.structure->joints[contact.joint].is_angular;
+    const double size = is_angle ? 1.0 : search_.lengths().Size(contact.a, contact.b);
+    return missed_ > 0.0 ? kNearKinkMargin * slack / (missed_ * size) : HUGE_VAL;
   }
 
   // A slip whose speed falls to 0, or nearly, and would rise again: friction that has stopped it
@@ -211,6 +220,7 @@ class GrazeFinder {
   const Model<double>& model_;
   EventSearch search_;
   double most_;
+  double missed_;
   const Segment* last_ = nullptr;  ///< of some length
   std::vector<ActiveContact> near_;
   std::vector<Graze>& grazes_;
@@ -218,10 +228,19 @@ class GrazeFinder {
 
 }  // namespace
 
-void FindGrazes(const Model<double>& model, const EventRecord& record, double most,
+double MissedBy(const Segment& motion) {
+  double fastest = 0.0;
+  for (size_t i = 2; i < motion.before.twist.size(); i += 3) {
+    fastest = std::max(fastest, std::abs(motion.before.twist[i]));
+  }
+  const double turn = fastest * motion.length;
+  return kMissedOfTurn * turn * turn * turn * turn * turn;
+}
+
+void FindGrazes(const Model<double>& model, const EventRecord& record, double most, double missed,
                 std::vector<Graze>* grazes) {
   grazes->clear();
-  GrazeFinder finder(model, most, grazes);
+  GrazeFinder finder(model, most, missed, grazes);
   for (int p = 0; p < record.num_parts; ++p) {
     if (!record.parts[p]->is_impulses) {
       finder.Add(record.parts[p]->segment);

@@ -30,8 +30,13 @@ struct Graze {
 /// acceleration a (only where the contact approaches from above, because the rebounds of a body
 /// that comes to rest are slow). A gap g* at which an approach turns around: margin g* / h,
 /// h = max(ġ0² / 2a, a dt² / 2) the height that it falls from, or falls in a step. Only those below
-/// `most` are listed.
-void FindGrazes(const Model<double>& model, const EventRecord& record, double most,
+/// `most` are listed. What turns around within `missed`, by which the motions until now may have
+/// missed their place (of a body's size, or rad), has at most the margin kNearKinkMargin.
+void FindGrazes(const Model<double>& model, const EventRecord& record, double most, double missed,
                 std::vector<Graze>* grazes);
+
+/// What a motion of a joint's bodies may miss of its place, of a body's size, or rad: (ω τ)⁵ / 20,
+/// its terms of fifth order in the turn of the body that turns fastest.
+double MissedBy(const Segment& motion);
 
 }  // namespace tangible

@@ -191,7 +191,7 @@ void ChoiceWatch::AddStep(const Model<double>& model, long step, Stepper* steppe
     }
     if (records.time >= end_) continue;
     std::vector<Graze> grazes;
-    FindGrazes(own, island.events, HUGE_VAL, &grazes);
+    FindGrazes(own, island.events, HUGE_VAL, 0.0, &grazes);
     for (const Graze& graze : grazes) {
       if (!std::isfinite(graze.slack) || graze.time > end_) continue;
       // The slips and limits of motions are choices of their own (AddSegment).

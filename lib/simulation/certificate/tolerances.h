@@ -9,6 +9,11 @@ namespace tangible {
 /// Of the size of the larger body: a contact that begins with a deeper penetration has not closed,
 /// but has become the nearest of several. Gaps that close are located to 1e-10 of the body.
 inline constexpr double kBegunDepth = 1e-7;
+/// Of the fifth power of a turn in one motion: what the motion of a joint's bodies misses of its
+/// place. A hinged body that a friction of constant moment brakes misses 0.022 of it.
+inline constexpr double kMissedOfTurn = 0.05;
+/// Of the size of a body, or rad: most that all motions together are said to miss.
+inline constexpr double kMostMissed = 1e-6;
 /// Of the way of a spring's ends past each other: where they come nearer, the spring has had no
 /// length. Straight motions round to 1e-15 of it.
 inline constexpr double kNoLength = 1e-9;

@@ -144,17 +144,17 @@ TEST(CertifyGrazingTest, MarginsAreThoseOfTheHeight) {
   const int disc = model.structure->moving[0];
   segment.after.twist[3 * disc + 1] = 2.0;
   std::vector<Graze> grazes;
-  FindGrazes(model, record, 10.0, &grazes);
+  FindGrazes(model, record, 10.0, 0.0, &grazes);
   ASSERT_EQ(grazes.size(), 1u);
   EXPECT_FALSE(grazes[0].touches);
   EXPECT_DOUBLE_EQ(grazes[0].time, 0.25);
   // The height by which 16 m/s² move it in a step is 1/2 m.
   EXPECT_NEAR(grazes[0].margin, 0.125 / 0.5, 1e-12);
-  FindGrazes(model, record, 0.2, &grazes);
+  FindGrazes(model, record, 0.2, 0.0, &grazes);
   EXPECT_TRUE(grazes.empty());
   // What leaves, and what is held closed, does not graze.
   std::swap(segment.before, segment.after);
-  FindGrazes(model, record, 10.0, &grazes);
+  FindGrazes(model, record, 10.0, 0.0, &grazes);
   EXPECT_TRUE(grazes.empty());
 }
 

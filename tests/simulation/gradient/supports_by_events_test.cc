@@ -711,5 +711,32 @@ TEST(SupportsByEventsTest, ALimitWhereItStopsIsAKink) {
   }
 }
 
+// A hinged body that turns by 3² / (2 · 0.6 / 0.23) rad until its support has stopped it, where the
+// motion of each step misses its place by some 1e-11 rad.
+TEST(SupportsByEventsTest, AHingesLimitWhereItStopsIsAKink) {
+  for (const double limit : {1.725, 1.725 + 1e-9, 1.73}) {
+    Scene scene = TableByEvents(R"("inertia": 0.05, "position": [0.3, 0], "velocity": [0, 0],
+            "support": {"load": 10, "friction": 0.2})",
+                                0.01, 2.0, "0, 0", R"(], "joints": [{"name": "h",
+            "type": "revolute", "bodies": ["b", "world"], "anchor": [0, 0], "rate": 3,
+            "limits": [-1, 2]})");
+    scene.joints[0].limits->second = limit;
+    const GradientResult both = Jacobian(scene, {"joints/h/rate"}, GradientMethod::kTangent);
+    ASSERT_TRUE(both.done) << both.message;
+    const std::string& verdict = both.certificate.verdict;
+    if (limit > 1.7275) {
+      EXPECT_EQ(verdict, "trustworthy");
+      EXPECT_NEAR(both.jacobian(2, 0), 1.15, 1e-6);
+      continue;
+    }
+    EXPECT_NE(verdict.find(", grazing"), std::string::npos) << limit << " " << verdict;
+    const GradientResult slower =
+        FinalStateJacobian(scene, testing::Resolve(scene, {"joints/h/rate"}),
+                           {.method = GradientMethod::kTangent, .side = DerivativeSide::kMinus});
+    ASSERT_TRUE(slower.done) << slower.message;
+    EXPECT_NEAR(slower.jacobian(2, 0), 1.15, 1e-6);
+  }
+}
+
 }  // namespace
 }  // namespace tangible
