@@ -9,6 +9,7 @@
 #include "tangible/dynamics/assembly/assembly.h"
 #include "tangible/simulation/certificate/tolerances.h"
 #include "tangible/simulation/derivatives/rollout_tangent.h"
+#include "tangible/simulation/events/load_speed.h"
 
 namespace tangible {
 namespace internal {
@@ -16,7 +17,8 @@ namespace internal {
 // The largest entries of the state, and of its derivative along each direction, during a run.
 class RunExtents {
  public:
-  RunExtents(const Model<double>& model, Eigen::Index columns) : model_(model), columns_(columns) {
+  RunExtents(const Model<double>& model, Eigen::Index columns)
+      : model_(model), lengths_(model), columns_(columns) {
     for (const int body : model.structure->moving) {
       const BodyIndex& index = model.structure->bodies[body];
       radius_.push_back(std::sqrt(model.parameters[index.inertia] / model.parameters[index.mass]));
@@ -39,6 +41,7 @@ class RunExtents {
     double twist = 0.0;  // m/s
   };
   const Model<double>& model_;
+  Lengths lengths_;
   std::vector<double> radius_;  // of moving blocks
   Extent state_;
   std::vector<Extent> columns_;
@@ -49,7 +52,10 @@ class RunExtents {
 void RunExtents::Add(long k, double t, const State<double>& state, const RowMatrixXd& w_dot) {
   const ModelStructure& s = *model_.structure;
   if (k < NumSteps(s.settings)) {
-    AssembleWithoutContacts(model_, state, t, StepLength(s.settings, k), &problem_, &scratch_);
+    const double h = StepLength(s.settings, k);
+    AssembleWithoutContacts(model_, state, t, h, &problem_, &scratch_);
+    // Loads that friction holds, of bodies at rest.
+    state_.twist = std::max(state_.twist, LoadSpeed(model_, lengths_, t, h, state));
   }
   for (size_t block = 0; block < radius_.size(); ++block) {
     const int body = s.moving[block];

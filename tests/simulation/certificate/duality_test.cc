@@ -145,6 +145,21 @@ TEST(DualityTest, RoundingOfWhatRestsIsNoDifference) {
   }
 }
 
+// Without gravity the motor's effort alone tells what rounding is.
+TEST(DualityTest, RoundingOfAMotorThatASupportHoldsIsNoDifference) {
+  for (const char* stepping : {"fixed", "event"}) {
+    const Scene scene = test_scenes::SceneOf(R"({"gravity": [0, 0], "bodies": [{"name": "a",
+        "mass": 1, "inertia": 0.05, "position": [0.3, 0], "support": {"friction": 0.2, "load": 10}}],
+        "joints": [{"name": "h", "type": "revolute", "bodies": ["a", "world"], "anchor": [0, 0],
+                    "motor": {"speed": 1, "limit": 0.5}}],
+        "simulation": {"dt": 0.01, "duration": 0.5, "stepping": ")" +
+                                             std::string(stepping) + R"("}})");
+    const Compared compared = CompareAlong(scene, {"bodies/a/mass", "joints/h/motor/limit"});
+    EXPECT_LT(compared.gap, 1e-11) << stepping;
+    EXPECT_EQ(compared.verdict, "trustworthy") << stepping;
+  }
+}
+
 // A sideways pull on a million tonnes that stand on a kilogram: by the tangent the lower box stays
 // where it is, by the adjoint it moves by 4e-9 m for 1 m/s². That is seen among many other bodies
 // too, whose outputs share columns of the adjoint.
