@@ -188,6 +188,11 @@ def test_rows_by_a_mask() -> None:
         simulation.reset(rows=[True, False])
     with pytest.raises(TypeError, match="rows: expected whole numbers, got True"):
         simulation.reset(rows=[True, 1, 2])
+    # Two threads would reset one row at once.
+    with pytest.raises(ValueError, match=r"rows: expected each row once, got \[0, 0\]"):
+        simulation.reset(rows=[0, 0])
+    with pytest.raises(ValueError, match="steps: expected at most 2147483647, got 1000000000000"):
+        simulation.step(steps=10**12)
 
 
 def test_an_action_that_is_no_number_fails_its_row() -> None:

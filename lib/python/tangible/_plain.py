@@ -136,8 +136,10 @@ def whole(value: Any, name: str, low: int = 0, high: int = 2**31 - 1, *, what: s
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, Integral):
         raise TypeError(f"{name}: expected {what}, got {said(value)}")
     found = int(value)
+    if found > high and str(high) not in what:
+        what = f"at most {high}"
     if not low <= found <= high:
-        raise ValueError(f"{name}: expected {what}, got {found}")
+        raise ValueError(f"{name}: expected {what}, got {said(found)}")
     return found
 
 

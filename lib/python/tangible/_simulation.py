@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core
-from ._plain import choice, integers, mapping, number, paths, seed_of, whole
+from ._plain import choice, integers, mapping, number, paths, said, seed_of, whole
 from ._rollout import MOST_THREADS, Numbers, Rollout, _array, finite, floats, one_value
 from ._scene import Scene, SceneLike
 
@@ -239,6 +239,8 @@ class Simulation:
         chosen = list(range(self._rows)) if rows is None else self._chosen(rows)
         if any(not 0 <= row < self._rows for row in chosen):
             raise ValueError(f"rows: expected numbers from 0 to {self._rows - 1}, got {chosen}")
+        if len(set(chosen)) < len(chosen):
+            raise ValueError(f"rows: expected each row once, got {said(chosen)}")
         count = len(chosen)
         own = self._rollout._defaults[0][0]
         if parameters is not None:

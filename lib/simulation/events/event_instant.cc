@@ -483,26 +483,29 @@ double EventStepper::SlowSpeed(const Model<double>& model, const State<double>& 
 
 namespace {
 
-// Whether a closed contact of the same bodies carries along nearly the same row what a contact that
-// leaves has carried, as where a ball rolls from one facet of a fine curve to the next: gravity
-// does not bring it back.
+// Whether a closed contact of the same moving bodies carries along nearly the same row what a
+// contact that leaves has carried, as where a ball rolls from one facet of a fine curve to the next,
+// or from one of two static bodies to the other: gravity does not bring it back.
 bool IsCarried(const Impulses& impact, size_t leaves) {
   const ContactProblem<double>& problem = impact.problem;
+  const auto row_of = [&](const ContactBlock<double>& x, int block) {
+    return block < 0 ? nullptr : block == x.a ? &x.normal_a : block == x.b ? &x.normal_b : nullptr;
+  };
   const auto product = [&](size_t i, size_t k) {
     const ContactBlock<double>& x = problem.contacts[i];
-    const ContactBlock<double>& y = problem.contacts[k];
     double sum = 0.0;
-    for (int j = 0; j < 3; ++j) {
-      if (x.a >= 0) sum += x.normal_a[j] * y.normal_a[j] / problem.mass[3 * x.a + j];
-      if (x.b >= 0) sum += x.normal_b[j] * y.normal_b[j] / problem.mass[3 * x.b + j];
+    for (const int block : {x.a, x.b}) {
+      const RowPart<double>* const own = row_of(x, block);
+      const RowPart<double>* const other = row_of(problem.contacts[k], block);
+      for (int j = 0; own != nullptr && other != nullptr && j < 3; ++j) {
+        sum += (*own)[j] * (*other)[j] / problem.mass[3 * block + j];
+      }
     }
     return sum;
   };
-  const ActiveContact& contact = impact.contacts[leaves];
   for (size_t k = 0; k < impact.contacts.size(); ++k) {
     if (k == leaves || impact.contacts[k].IsPureFriction() ||
-        impact.solution.modes[k] == ContactMode::kOpen ||
-        !impact.contacts[k].IsBetweenTheSame(contact)) {
+        impact.solution.modes[k] == ContactMode::kOpen) {
       continue;
     }
     const double own = product(leaves, leaves), other = product(k, k);

@@ -87,7 +87,7 @@ bool EventStepper::ChooseModes(const Model<double>& model, const State<double>& 
     segment->friction = listed_friction_;
     segment->modes.clear();
   }
-  supports_.Shorten(model, start_.solution.motion, segment);
+  supports_.Shorten(model, &start_, segment);
   return true;
 }
 

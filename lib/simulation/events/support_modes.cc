@@ -430,9 +430,52 @@ bool SupportModes::HoldsStarting(const Segment& segment) const {
   return false;
 }
 
+// Friction turns a velocity into the direction of motion at the rate M⁻¹ Ψ'', and of that rate
+// joints and contacts leave this share: none of a hinge's body, which can turn its velocity by no
+// other motion than its own. By traces, where it is far from 1.
+double SupportModes::ShareOfDecay(const Model<double>& model, int k, const Segment& segment,
+                                  SolvedNode* start) {
+  const ModelStructure& s = *model.structure;
+  if (s.joints.empty() && segment.contacts.empty()) return 1.0;
+  const SupportIndex& support = s.supports[k];
+  const size_t first = 3 * static_cast<size_t>(s.bodies[support.body].block);
+  const double* twist = &segment.before.twist[3 * static_cast<size_t>(support.body)];
+  const SupportState& at = segment.before.supports[k];
+  double alone = 0.0, joined = 0.0;
+  const auto add = [&](const double row[3], double weight) {
+    response_.assign(3 * static_cast<size_t>(start->system.num_blocks()), 0.0);
+    std::copy_n(row, 3, &response_[first]);
+    start->system.Solve(start->problem, start->solution.modes, response_.data(), 1);
+    for (int i = 0; i < 3; ++i) {
+      alone += weight * row[i] * row[i] / start->problem.mass[first + i];
+      joined += weight * row[i] * response_[first + i];
+    }
+  };
+  if (friction_.is_disc()) {
+    double rows[3][3], weights[3];
+    DiscDampers(1.5 * friction_.arm(), twist, rows, weights);
+    for (int i = 0; i < 3; ++i) add(rows[i], weights[i]);
+  }
+  for (size_t i = 0; !friction_.is_disc() && i < friction_.points().size(); ++i) {
+    if (static_cast<int>(i) == at.holds || static_cast<int>(i) == at.slow) continue;
+    const SupportPoint& point = friction_.points()[i];
+    double v[2];
+    point.VelocityAt(twist, v);
+    const double speed = std::hypot(v[0], v[1]);
+    if (!(speed > 0.0)) continue;
+    const double across[2] = {-v[1] / speed, v[0] / speed};
+    const double row[3] = {across[0], across[1],
+                           point.arm[0] * across[1] - point.arm[1] * across[0]};
+    add(row, point.limit / speed);
+  }
+  const double share = joined / alone;
+  return share >= -kMostLeft && share <= kMostLeft ? std::max(share, 0.0) : 1.0;
+}
+
 // The longest motion that a support allows, s.
-double SupportModes::LongestOf(const Model<double>& model, int k, const double acceleration[3],
-                               const Segment& segment) {
+double SupportModes::LongestOf(const Model<double>& model, int k, const Segment& segment,
+                               SolvedNode* start) {
+  const double* acceleration = NumbersOfBlock(model, k, start->solution.motion);
   const ModelStructure& s = *model.structure;
   const SupportIndex& support = s.supports[k];
   const BodyIndex& body = s.bodies[support.body];
@@ -452,9 +495,14 @@ double SupportModes::LongestOf(const Model<double>& model, int k, const double a
   const double mass = model.parameters[body.mass];
   const double inertia = model.parameters[body.inertia];
   double longest = HUGE_VAL;
+  double share = -1.0;  // ShareOfDecay, where it matters
   const auto limit = [&](double v, double a, double weight, double arm) {
-    const double decay = weight * (1.0 / mass + arm * arm / inertia);
-    longest = std::min(longest, v / std::max(a / kSupportTurn, decay / kSupportDecay));
+    double decay = weight * (1.0 / mass + arm * arm / inertia) / kSupportDecay;
+    if (decay > a / kSupportTurn && v < decay * std::min(longest, segment.length)) {
+      if (share < 0.0) share = ShareOfDecay(model, k, segment, start);
+      decay *= share;
+    }
+    longest = std::min(longest, v / std::max(a / kSupportTurn, decay));
   };
   if (friction_.is_disc()) {
     limit(speed, size, friction_.limit(), friction_.arm());
@@ -469,10 +517,10 @@ double SupportModes::LongestOf(const Model<double>& model, int k, const double a
     if (static_cast<int>(i) == at.slow) {
       const double change = std::hypot(a[0], a[1]);
       const double least = kFirstOfSupport * dt_;
-      const double share = change > 0.0 ? std::hypot(v[0], v[1]) / change : 0.0;
-      longest =
-          std::min(longest, courses_[k] == Course::kStops && change > 0.0 ? 4.0 * share
-                                                                          : std::max(least, share));
+      const double to_rest = change > 0.0 ? std::hypot(v[0], v[1]) / change : 0.0;
+      longest = std::min(longest, courses_[k] == Course::kStops && change > 0.0
+                                      ? 4.0 * to_rest
+                                      : std::max(least, to_rest));
       continue;
     }
     limit(std::hypot(v[0], v[1]), std::hypot(a[0], a[1]), point.limit,
@@ -481,12 +529,10 @@ double SupportModes::LongestOf(const Model<double>& model, int k, const double a
   return longest;
 }
 
-void SupportModes::Shorten(const Model<double>& model, const std::vector<double>& accelerations,
-                           Segment* segment) {
+void SupportModes::Shorten(const Model<double>& model, SolvedNode* start, Segment* segment) {
   double longest = HUGE_VAL;
   for (int k = 0; k < static_cast<int>(model.structure->supports.size()); ++k) {
-    longest =
-        std::min(longest, LongestOf(model, k, NumbersOfBlock(model, k, accelerations), *segment));
+    longest = std::min(longest, LongestOf(model, k, *segment, start));
   }
   if (!(segment->length > longest)) return;
   double spacing = dt_;

@@ -63,9 +63,8 @@ class SupportModes {
   bool HoldsStarting(const Segment& segment) const;
   /// Shortens the motion to what its supports allow, to a multiple of dt / 2^k since the start of
   /// the step: near states have the same k, so that its end is a given instant and derivatives are
-  /// exact. `accelerations`: those at its start, three for each moving body.
-  void Shorten(const Model<double>& model, const std::vector<double>& accelerations,
-               Segment* segment);
+  /// exact. `start`: the accelerations at its start.
+  void Shorten(const Model<double>& model, SolvedNode* start, Segment* segment);
 
  private:
   static constexpr int kMostChanges = 150;
@@ -101,8 +100,8 @@ class SupportModes {
                    int* changes, SupportState* at) const;
   void Seek(int k, SupportState* at);
   void GoOn(const Model<double>& model, int k, State<double>* before);
-  double LongestOf(const Model<double>& model, int k, const double acceleration[3],
-                   const Segment& segment);
+  double LongestOf(const Model<double>& model, int k, const Segment& segment, SolvedNode* start);
+  double ShareOfDecay(const Model<double>& model, int k, const Segment& segment, SolvedNode* start);
 
   double start_ = 0.0;  ///< of the step
   double dt_ = 0.0;
@@ -120,6 +119,7 @@ class SupportModes {
   ContactProblem<double> pushed_;     ///< masses and what pushes bodies that are at rest
   SupportFriction friction_;
   SupportIteration iteration_;
+  std::vector<double> response_;  ///< of the start's system to a unit force
 };
 
 }  // namespace tangible

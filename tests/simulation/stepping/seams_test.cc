@@ -10,6 +10,7 @@
 #include <tuple>
 #include <vector>
 
+#include "../../support/gradients.h"
 #include "../../support/scenes.h"
 #include "tangible/simulation/certificate/certify.h"
 #include "tangible/simulation/gradient/gradient.h"
@@ -582,6 +583,31 @@ TEST(SeamsTest, ABowlOfFacetsTendsToTheSmoothOne) {
   EXPECT_LT(fine, 2.0);
   EXPECT_GT(fine, 0.0);
   EXPECT_NEAR(highest(72, Stepping::kEvent), 58.0, 1.0);
+}
+
+// A disc that passes to a floor that rises by so little that it leaves the first one more slowly than
+// gravity would bring it back: v − g a (T − t), and 1 for its derivative but for the root of a.
+TEST(SeamsTest, ADiscPassesToANearlyParallelFloor) {
+  for (const auto& [slope, speed] :
+       {std::pair(1e-4, 0.1), std::pair(1e-3, 0.01), std::pair(1e-5, 1.0), std::pair(1e-6, 1.0)}) {
+    const Scene scene = test_scenes::SceneOf(
+        R"({"gravity": [0, -10], "bodies": [{"name": "b", "shape": {"circle": {"radius": 0.1}},
+            "mass": 1, "velocity": )" +
+        Pair(speed, 0) + R"(, "position": )" + Pair(-0.2 * speed, 0.1) + R"(},
+            {"name": "A", "static": true, "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}},
+            {"name": "B", "static": true, "shape": {"half_plane": {"offset": 0, "normal": )" +
+        Pair(-slope, 1) + R"(}}}], "simulation": {"dt": 0.01, "duration": 0.25,
+            "stepping": "event"}})");
+    const GradientResult result =
+        FinalStateJacobian(scene, testing::Resolve(scene, {"bodies/b/velocity/x"}),
+                           {.method = GradientMethod::kTangent});
+    ASSERT_TRUE(result.done) << result.message;
+    EXPECT_EQ(result.certificate.verdict, "trustworthy");
+    // The disc touches B before its centre is over it, by its radius times half of the slope.
+    const double behind = 0.05 + 0.05 * slope / speed;
+    EXPECT_NEAR(result.values[3], speed - 10.0 * slope * behind, 1e-6 * speed) << slope;
+    EXPECT_NEAR(result.jacobian(3, 0), 1.0 - 10.0 * slope * 0.2 / speed, 1e-3) << slope;
+  }
 }
 
 }  // namespace
