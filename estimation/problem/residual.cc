@@ -201,8 +201,13 @@ std::optional<Certificate> RolloutResiduals::Certify(const Eigen::VectorXd& p) {
     sizes.push_back(std::max(std::abs(p[static_cast<Eigen::Index>(names.size())]), entry.scale));
     names.push_back(entry.name);
   }
+  // A velocity at the end of a step may be that before an event or behind it.
+  std::vector<StateRead> reads;
+  for (const Sample& sample : plan_.samples()) {
+    if (plan_.width() > 3 && sample.part == 0.0) reads.push_back({sample.step, sample.body});
+  }
   Certificate certificate = CertifyDerivative(scene_.model(), scene_.initial_state(),
-                                              scene_.VariableDerivatives(), names, sizes);
+                                              scene_.VariableDerivatives(), names, sizes, reads);
   NameSamplesOnImpacts(&certificate);
   return certificate;
 }

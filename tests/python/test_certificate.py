@@ -110,3 +110,31 @@ def test_what_fails_has_no_derivative_to_trust() -> None:
     assert not found and found.kind == "discontinuous" and "the run fails" in found["verdict"]
     refused = rollout.certificates([[-1.0]])[0]
     assert not refused and "there is no run: bodies/b/mass: expected a number > 0" in refused["verdict"]
+
+
+def test_a_state_that_is_read_at_an_event_is_named() -> None:
+    scene = tangible.Scene(
+        gravity=[0, -10], simulation={"stepping": "event", "dt": 0.05, "duration": 0.8}
+    )
+    scene.add_body(
+        "ball", shape={"circle": {"radius": 0.5}}, mass=1, position=[0, 1.3], restitution=0.25
+    )
+    scene.add_body(
+        "floor", static=True, restitution=0.25, shape={"half_plane": {"normal": [0, 1], "offset": 0}}
+    )
+    # It falls by 0.8 m in 0.4 s.
+    for records, kind in (([7, 16], "trustworthy"), ([8], "discontinuous")):
+        rollout = tangible.Rollout(scene, ["bodies/ball/position/y"], records=records)
+        assert rollout.certificate().kind == kind, records
+    table = tangible.Scene(
+        gravity=[0, 0], simulation={"stepping": "event", "dt": 0.05, "duration": 1}
+    )
+    table.add_body(
+        "block", mass=1, inertia=1, position=[0, 0], velocity=[1, 0], support={"friction": 0.2, "load": 10}
+    )
+    table.add_body("free", mass=1, inertia=1, position=[1, 1])
+    table.add_force("push", body="free", force=[2, 0], end=0.5)
+    # The block stops after 1 / 2 s, as the push ends.
+    for path, kind in (("bodies/block/velocity/x", "near_kink"), ("forces/push/end", "one_sided")):
+        assert tangible.Rollout(table, [path], records=[9, 20]).certificate().kind == "trustworthy"
+        assert tangible.Rollout(table, [path], records=[10]).certificate().kind == kind

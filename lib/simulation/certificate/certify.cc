@@ -39,6 +39,8 @@ double ApproachOf(const StepRecord& impact, size_t first, size_t last) {
   return approach;
 }
 
+constexpr char kIsRead[] = " s is where a state is read";
+
 std::string WhereItSteps(const std::string& which, const std::string& other) {
   return which + " s is where " + other + " steps";
 }
@@ -476,6 +478,7 @@ void RolloutCertifier::AddForceWindows(const Model<double>& model) {
                  (same(time, 0.0) ? " s is the start of the run" : " s is the end of the run"));
         return;
       }
+      if (IsReadAt(*model.structure, time)) OneSided(which + kIsRead);
       const double near =
           kSameInstant * settings.dt + kCoordinateRounding * std::abs(settings.duration);
       if (OwnSignalSteps(*model.structure, force, time - near, time + near)) {
@@ -523,11 +526,45 @@ void RolloutCertifier::AddReleases(const Model<double>& model) {
       OneSided(which + " s is the start of the run");
     } else if (std::abs(time - settings.duration) <= near) {
       OneSided(which + " s is the end of the run");
+    } else if (IsReadAt(*model.structure, time)) {
+      OneSided(which + kIsRead);
     } else if (const std::string other = OtherJump(model, time, near, "joint " + joint.name);
                !other.empty()) {
       OneSided(WhereItSteps(which, other));
     }
   }
+}
+
+bool RolloutCertifier::IsRead(const ModelStructure& structure, long steps) const {
+  return steps == NumSteps(structure.settings) ||
+         std::any_of(options_.reads.begin(), options_.reads.end(),
+                     [&](const StateRead& read) { return read.steps == steps; });
+}
+
+bool RolloutCertifier::IsReadAt(const ModelStructure& structure, double time) const {
+  return std::any_of(options_.reads.begin(), options_.reads.end(), [&](const StateRead& read) {
+    return IsSameInstant(structure, time, StepTime(structure.settings, read.steps));
+  });
+}
+
+std::string RolloutCertifier::AsRead(const ModelStructure& structure, long steps,
+                                     const char* event) const {
+  const bool ends = steps == NumSteps(structure.settings);
+  return std::string(ends ? "the run ends as " : "a state is read as ") + event;
+}
+
+bool RolloutCertifier::MovesRead(const ModelStructure& structure, long steps,
+                                 const ActiveContact& contact) const {
+  if (steps == NumSteps(structure.settings)) return true;
+  const ActiveContact whole = island_ != nullptr ? island_->InWhole(contact) : contact;
+  const auto is_joined = [&](int body) {
+    return std::any_of(structure.joints.begin(), structure.joints.end(),
+                       [&](const JointIndex& joint) { return joint.a == body || joint.b == body; });
+  };
+  return std::any_of(options_.reads.begin(), options_.reads.end(), [&](const StateRead& read) {
+    return read.steps == steps && (read.body < 0 || read.body == whole.a || read.body == whole.b ||
+                                   is_joined(contact.a) || is_joined(contact.b));
+  });
 }
 
 // Whether a body has a joint or spring, or touches another one as the run starts.
@@ -556,6 +593,8 @@ void RolloutCertifier::AddPaths(const Model<double>& model) {
         if (ActsAtStart(s, index.body)) OneSided(which + " s is the start of the run");
       } else if (IsSameInstant(s, time, s.settings.duration)) {
         OneSided(which + " s is the end of the run");
+      } else if (IsReadAt(s, time)) {
+        OneSided(which + kIsRead);
       } else if (s.settings.stepping == Stepping::kFixed &&
                  IsSameInstant(s, time, StepTime(s.settings, step))) {
         OneSided(which + " s is on a step's boundary");
@@ -707,10 +746,11 @@ bool HasOneDerivative(const Model<double>& model, const State<double>& initial,
 
 Certificate CertifyDerivative(const Model<double>& model, const State<double>& initial,
                               const RowMatrixXd& directions, const std::vector<std::string>& names,
-                              const std::vector<double>& sizes) {
+                              const std::vector<double>& sizes,
+                              const std::vector<StateRead>& reads) {
   constexpr double kMostExceeded = 1e6;
   RolloutReport report;
-  RolloutCertifier certifier({NumbersOf(*model.structure, directions), directions, names});
+  RolloutCertifier certifier({NumbersOf(*model.structure, directions), directions, names, reads});
   Certificate certificate = Certify(model, initial, &certifier, &report);
   if (certificate.degenerate_rows > 0 && report.status == StepStatus::kDone &&
       model.structure->settings.stepping == Stepping::kFixed &&

@@ -48,6 +48,12 @@
 
 namespace tangible {
 
+/// A state during the run that is an output too: that of a body after so many steps, −1: of all.
+struct StateRead {
+  long steps = 0;
+  int body = -1;
+};
+
 struct CertifyOptions {
   /// Indices of the model's numbers with respect to which derivatives are taken, ascending.
   std::vector<int> numbers;
@@ -55,6 +61,8 @@ struct CertifyOptions {
   /// taken, one in each column, and their names.
   RowMatrixXd directions;
   std::vector<std::string> names;
+  /// Beside the state at the end; with their twists.
+  std::vector<StateRead> reads;
 };
 
 /// Two bodies near a change of the corners and edges of their contact, before a fixed step.
@@ -133,6 +141,13 @@ class RolloutCertifier {
                   Segment* segment);
   void AddFriction(const CoefficientSource& friction, const Place& place);
   void AddEnd(const Model<double>& model, long step, const EventRecord& record);
+  /// Whether the state after so many steps is an output; `time`: at that instant.
+  bool IsRead(const ModelStructure& structure, long steps) const;
+  bool IsReadAt(const ModelStructure& structure, double time) const;
+  /// What is said of an event as the run ends, or a state is read.
+  std::string AsRead(const ModelStructure& structure, long steps, const char* event) const;
+  /// Whether a body of the contact is one whose state is read, or may move it by a joint.
+  bool MovesRead(const ModelStructure& structure, long steps, const ActiveContact& contact) const;
   void AddSupportsAtStart(const Model<double>& model, const Segment& first);
   void AddHandOversAtStart(const Model<double>& model, const State<double>& start,
                            const std::vector<const ActiveContact*>& touching);
@@ -288,7 +303,8 @@ inline constexpr char kUndeterminedFriction[] =
 /// least the gap between tangent and adjoint (duality.h), both of which are run.
 Certificate CertifyDerivative(const Model<double>& model, const State<double>& initial,
                               const RowMatrixXd& directions, const std::vector<std::string>& names,
-                              const std::vector<double>& sizes = {});
+                              const std::vector<double>& sizes = {},
+                              const std::vector<StateRead>& reads = {});
 
 /// "contact of ball and floor", "low limit of joint hinge".
 std::string ContactName(const ModelStructure& structure, const ActiveContact& contact);

@@ -553,7 +553,8 @@ void RolloutCertifier::AddTouchesAtEnd(const Model<double>& model, long step, co
   search.FindContacts(model, last.after, reach, &near);
   AppendLimits(model, last.after, &near);
   for (const ActiveContact& contact : near) {
-    AddTouchBehind(model, step, last, contact, "the run ends as it touches");
+    if (!MovesRead(s, step + 1, contact)) continue;
+    AddTouchBehind(model, step, last, contact, AsRead(s, step + 1, "it touches"));
   }
 }
 
@@ -564,15 +565,16 @@ void RolloutCertifier::AddHandOversAtEnd(const Model<double>& model, long step,
                                          const Segment& last) {
   const ModelStructure& s = *model.structure;
   for (const ActiveContact& contact : last.contacts) {
-    if (IsHandedOver(model, last.after, contact, kNearKinkMargin * s.settings.dt)) {
+    if (MovesRead(s, step + 1, contact) &&
+        IsHandedOver(model, last.after, contact, kNearKinkMargin * s.settings.dt)) {
       AddMargin(0.0, {&s, step, last.time + last.length, 0, &contact, ContactMode::kOpen},
-                "the run ends as another corner or edge takes over");
+                AsRead(s, step + 1, "another corner or edge takes over"));
     }
   }
 }
 
-// Events at the run's last instant, or just before or behind it: beside it they have happened or
-// not, which is another derivative of twists, or other twists. Positions have the same on both
+// Events at the run's last instant, or at one at which a state is read, or just before or behind it:
+// beside it they have happened or not, which is another derivative of twists, or other twists. Positions have the same on both
 // sides, as do all where forces change gradually (a start of sliding, a lift-off).
 void RolloutCertifier::AddEnd(const Model<double>& model, long step, const EventRecord& record) {
   const ModelStructure& s = *model.structure;
@@ -581,9 +583,9 @@ void RolloutCertifier::AddEnd(const Model<double>& model, long step, const Event
   const Segment* last = nullptr;
   const auto add = [&](double time, const ActiveContact& contact) {
     const double margin = std::abs(end - time) / dt;
-    if (margin < kNearKinkMargin) {
+    if (margin < kNearKinkMargin && MovesRead(s, step + 1, contact)) {
       AddMargin(margin, {&s, step, time, 0, &contact, ContactMode::kOpen},
-                "the run ends as it stops sliding");
+                AsRead(s, step + 1, "it stops sliding"));
     }
   };
   for (int p = 0; p < record.num_parts; ++p) {
@@ -596,9 +598,9 @@ void RolloutCertifier::AddEnd(const Model<double>& model, long step, const Event
     }
     if (segment.event == EventKind::kTouch && end - time < kNearJumpMargin * dt) {
       const double speed = SpeedsOf(model, segment.after, segment.event_contact).normal;
-      if (speed < -Negligible(model, speed)) {
+      if (speed < -Negligible(model, speed) && MovesRead(s, step + 1, segment.event_contact)) {
         AddJump((end - time) / dt, {&s, step, time, 0, &segment.event_contact, ContactMode::kOpen},
-                "the run ends as it touches");
+                AsRead(s, step + 1, "it touches"));
       }
     }
   }
@@ -716,7 +718,7 @@ void RolloutCertifier::AddIsland(const Model<double>& model, long step, EventDer
       most = std::max(most, count);
     }
   }
-  if (step + 1 == NumSteps(model.structure->settings)) AddEnd(model, step, record);
+  if (IsRead(*model.structure, step + 1)) AddEnd(model, step, record);
   // Infinitely many impacts in a finite time (Zeno): rounding decides how many of them are
   // computed.
   if (2 * most > model.structure->settings.max_events_per_step) {

@@ -148,10 +148,13 @@ Certificate RolloutWorker::Certify(const RolloutInput& input, const std::vector<
   const std::vector<std::string> outputs = OutputNames(*f_.structure_);
   names.insert(names.end(), outputs.begin(), outputs.begin() + states);
   const RowMatrixXd directions = VariableDirections(of_parameters, of_states);
+  std::vector<StateRead> reads;
+  for (const long steps : f_.records_) reads.push_back({steps});
   if (f_.num_controls() == 0) {
-    return WithoutIdleKinks(input, CertifyDerivative(model_, initial_, directions, names, sizes));
+    return WithoutIdleKinks(input,
+                            CertifyDerivative(model_, initial_, directions, names, sizes, reads));
   }
-  CertifyOptions options{controls_.numbers, directions, names};
+  CertifyOptions options{controls_.numbers, directions, names, reads};
   for (int i = 0; i < f_.structure_->num_parameters; ++i) {
     if (!directions.row(f_.structure_->ParameterVariable(i)).isZero(0.0)) {
       options.numbers.push_back(i);
