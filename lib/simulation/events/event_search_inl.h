@@ -119,7 +119,10 @@ enum class Course { kUnknown, kNoRoot, kOneRoot };
 inline Course CourseOf(double length, double fa, double rate_a, double fb, double rate_b) {
   constexpr double kSlack = 0.1;
   const double mean = (fb - fa) / length;
-  const double most = kSlack * std::max(std::abs(rate_a), std::abs(rate_b));
+  // What changes the function by less than a part of its values is rounding, as of what moves along
+  // with the other body.
+  const double steady = fb > 0.0 ? std::min(fa, fb) / length : 0.0;
+  const double most = kSlack * std::max({std::abs(rate_a), std::abs(rate_b), steady});
   if (!(mean >= std::min(rate_a, rate_b) - most && mean <= std::max(rate_a, rate_b) + most)) {
     return Course::kUnknown;  // the rate is not monotonic
   }
@@ -130,7 +133,7 @@ inline Course CourseOf(double length, double fa, double rate_a, double fb, doubl
     return Course::kNoRoot;  // the smaller end is the minimum
   }
   // The function lies above the tangents at both ends.
-  const double at = (fb - fa - rate_b * length) / (rate_a - rate_b);
+  const double at = std::clamp((fb - fa - rate_b * length) / (rate_a - rate_b), 0.0, length);
   return fa + rate_a * at > kSlack * std::min(fa, fb) ? Course::kNoRoot : Course::kUnknown;
 }
 
