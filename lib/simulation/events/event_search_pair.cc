@@ -191,7 +191,9 @@ class EventSearch::PairSearch {
                          Counts counts);
   // Searches for the first time at which gap + allowed closes, and sets the event to it.
   void SearchFrom(double from, double allowed, Counts counts);
-  // Whether the nearest contact is of corners of a pair that touches and passes by.
+  // Whether the nearest contact is of corners of a pair that touches, and does not approach.
+  bool Keeps(const State<double>& state) const;
+  // Whether it is one, and passes by.
   bool NearestPassesBy(const State<double>& state) const;
   // The acceleration of the gap that the turning of an ellipse gives, m/s²; 0 where neither is one.
   double TurningAcceleration(const State<double>& end) const;
@@ -532,7 +534,10 @@ void EventSearch::PairSearch::SearchFrom(double from, double allowed, Counts cou
     if (!std::isfinite(value)) {
       return value;
     }
-    if (!all && touches_ && value <= touch_ && NearestPassesBy(sample.motion.after)) return touch_;
+    if (!all && touches_ && value <= touch_ &&
+        (Keeps(sample.motion.after) || NearestPassesBy(sample.motion.after))) {
+      return touch_;
+    }
     const bool approaches = value > 0.0 || !all ||
                             !HaveAt(touching_, nearest_, sample.motion.after) ||
                             SpeedsOf(model_, sample.motion.after, nearest_).normal < -search_.slow_;
@@ -554,6 +559,13 @@ void EventSearch::PairSearch::SearchFrom(double from, double allowed, Counts cou
                       : EventKind::kTouch;
     event_.contact = nearest_;
   }
+}
+
+// Of corners that meet rounding chooses the features: where they move along with each other nothing
+// touches.
+bool EventSearch::PairSearch::Keeps(const State<double>& state) const {
+  return HaveCorners(*model_.structure, nearest_) &&
+         SpeedsOf(model_, state, nearest_).normal >= -search_.slow_;
 }
 
 // At the instant at which a corner passes another one rounding chooses the nearest features: those
