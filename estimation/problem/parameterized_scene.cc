@@ -148,7 +148,7 @@ bool ParameterizedScene::Finish(ParameterError* error) {
       moves_times_ = moves_times_ || measured[number].moves_time;
     }
   }
-  structure_ = BuildStructure(scene_);
+  structure_ = WithFreePoints(scene_, BuildStructure(scene_), directions_);
   if (!Set(Initial())) {
     const std::string reason = Validate(scene_, "the scene with these values");
     *error = {-1, -1, "",
@@ -431,7 +431,7 @@ void ParameterizedScene::SetInitial(const Eigen::VectorXd& p) {
 
 void ParameterizedScene::SetSimulation(const SimulationSettings& settings) {
   scene_.simulation = settings;
-  structure_ = BuildStructure(scene_);
+  structure_ = WithFreePoints(scene_, BuildStructure(scene_), directions_);
   BuildModelWithStructure(scene_, structure_, &model_, &state_);
 }
 

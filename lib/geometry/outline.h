@@ -84,6 +84,8 @@ class Outline {
   const OutlineRun& run(int i) const { return runs_[i]; }
   /// The box of all edges.
   const Aabb& box() const { return tree_[1]; }
+  /// The foot of an edge's start over its run.
+  double StartOfEdge(int edge) const { return along_[static_cast<size_t>(edge)]; }
   /// The edge of a run at the foot s.
   int EdgeAt(int run, double s) const;
   /// Whether a point is over a run at its start, or its end (see above).

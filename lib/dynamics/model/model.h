@@ -50,6 +50,7 @@ struct BodyIndex {
   int num_shape_numbers = 0;
   int contact_points = -1;  ///< two coordinates each
   int num_contact_points = 0;
+  bool has_free_points = false;  ///< derivatives by points of its shape are taken (WithFreePoints)
 
   PartIndex Part(int part) const {
     return part == 0 || part > num_contact_points

@@ -37,6 +37,35 @@ BasicScene<T> SeededScene(const Scene& scene, const std::vector<ParameterDirecti
   return seeded;
 }
 
+std::shared_ptr<const ModelStructure> WithFreePoints(
+    const Scene& scene, const std::shared_ptr<const ModelStructure>& structure,
+    const std::vector<ParameterDirection>& parameters) {
+  const auto has_points = [](const BodyIndex& body) {
+    return body.shape == ShapeType::kPolyline || body.shape == ShapeType::kPolygon;
+  };
+  if (std::none_of(structure->bodies.begin(), structure->bodies.end(), has_points)) {
+    return structure;
+  }
+  Scene copy = scene;
+  const std::vector<SceneNumber<double>> numbers = EnumerateNumbers(&copy);
+  std::shared_ptr<ModelStructure> marked;
+  for (size_t k = 0; k < structure->bodies.size(); ++k) {
+    if (!has_points(structure->bodies[k])) continue;
+    const std::string shape = "bodies/" + structure->bodies[k].name + "/shape/";
+    const auto moves_point = [&](const SetNumber& set) {
+      const std::string& path = numbers[static_cast<size_t>(set.number)].path;
+      return path.rfind(shape, 0) == 0;
+    };
+    for (const ParameterDirection& parameter : parameters) {
+      if (std::none_of(parameter.begin(), parameter.end(), moves_point)) continue;
+      if (marked == nullptr) marked = std::make_shared<ModelStructure>(*structure);
+      marked->bodies[k].has_free_points = true;
+      break;
+    }
+  }
+  return marked == nullptr ? structure : marked;
+}
+
 Eigen::SparseMatrix<double> VariableJacobian(const Scene& scene,
                                              const std::shared_ptr<const ModelStructure>& structure,
                                              const std::vector<ParameterDirection>& parameters) {

@@ -29,6 +29,12 @@ using ParameterDirection = std::vector<SetNumber>;
 /// The direction of a resolved path: each of its values with scale 1.
 ParameterDirection DirectionOf(const ParameterPath& path);
 
+/// The structure of a scene for derivatives by parameters: bodies whose outlines have points that
+/// one of these moves are marked.
+std::shared_ptr<const ModelStructure> WithFreePoints(
+    const Scene& scene, const std::shared_ptr<const ModelStructure>& structure,
+    const std::vector<ParameterDirection>& parameters);
+
 /// d [poses | twists | the model's parameters] / d the scene's parameters: num_variables x
 /// num_parameters, column-major.
 Eigen::SparseMatrix<double> VariableJacobian(const Scene& scene,

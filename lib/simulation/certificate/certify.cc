@@ -142,6 +142,7 @@ void RolloutCertifier::AddContact(const Model<double>& model, const StepRecord& 
   AddLaw(model, record, place);
   if (place.mode != ContactMode::kOpen) {
     AddCoefficients(record, place);
+    AddFlushCorner(model, record.before, *place.active, record.time);
   }
 }
 

@@ -155,6 +155,10 @@ class RolloutCertifier {
   void AddTouchesAtEnd(const Model<double>& model, long step, const Segment& last);
   void AddTouchBehind(const Model<double>& model, long step, const Segment& last,
                       const ActiveContact& contact, const std::string& what);
+  /// A contact over a flush corner whose points are parameters, where the derivative by them is
+  /// that of the edge on one side.
+  void AddFlushCorner(const Model<double>& model, const State<double>& state,
+                      const ActiveContact& contact, double time);
   void AddLimitsAtRelease(const Model<double>& model, long step, const Segment& segment);
   void AddClosedAtOnce(const Model<double>& model, long step, const Segment& segment);
   void AddTwoLimits(const Model<double>& model, long step, const Segment& segment);

@@ -124,6 +124,9 @@ void RolloutCertifier::AddImpact(const Model<double>& model, long step, Impulses
                     (block.driven ? "driven and " : "") + ModeName(place.mode));
       certificate_.degenerate_rows += margin.value < kDegenerateTolerance ? 1 : 0;
     }
+    if (is_first && place.mode != ContactMode::kOpen) {
+      AddFlushCorner(model, impact->before, contact, impact->time);
+    }
     const CoefficientSource& friction = impact->friction[i];
     if (place.mode != ContactMode::kOpen && friction.value == 0.0 &&
         (Wanted(friction.numbers[0]) || Wanted(friction.numbers[1]))) {
@@ -606,6 +609,9 @@ void RolloutCertifier::AddEnd(const Model<double>& model, long step, const Event
   }
   if (last == nullptr) return;
   for (size_t i = 0; i < last->contacts.size(); ++i) {
+    if (MovesRead(s, step + 1, last->contacts[i])) {
+      AddFlushCorner(model, last->after, last->contacts[i], end);
+    }
     const double before = SlipOf(model, last->before, last->contacts[i]);
     const double after = SlipOf(model, last->after, last->contacts[i]);
     if (SlidingSign(last->modes[i]) != 0.0 && after < before) {

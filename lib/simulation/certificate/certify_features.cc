@@ -9,6 +9,7 @@
 #include "tangible/simulation/certificate/certify.h"
 #include "tangible/simulation/certificate/tolerances.h"
 #include "tangible/simulation/derivatives/rollout_tangent.h"
+#include "tangible/simulation/events/flush_corners.h"
 
 namespace tangible {
 namespace {
@@ -67,6 +68,13 @@ bool RolloutCertifier::LeaveOutFeatures(const Model<double>& model, const State<
   certificate->margin_where = where_but_features_;
   SetVerdict(*certificate);
   return true;
+}
+
+void RolloutCertifier::AddFlushCorner(const Model<double>& model, const State<double>& state,
+                                      const ActiveContact& contact, double time) {
+  if (!IsOverFlushCorner(model, state, contact)) return;
+  OneSided(ContactName(*model.structure, contact) +
+           " is over a flush corner at t = " + Short(time) + " s, whose points are parameters");
 }
 
 }  // namespace tangible

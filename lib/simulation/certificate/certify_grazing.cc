@@ -8,6 +8,7 @@
 #include "tangible/simulation/certificate/certify.h"
 #include "tangible/simulation/certificate/certify_place_inl.h"
 #include "tangible/simulation/events/event_search.h"
+#include "tangible/simulation/events/flush_corners.h"
 
 namespace tangible {
 namespace {
@@ -293,7 +294,11 @@ void RolloutCertifier::AddTwoLimits(const Model<double>& model, long step, const
     return std::hypot(state.twist[3 * body], state.twist[3 * body + 1]);
   };
   const auto opens = [&](const ActiveContact& contact) {
-    if (Has(segment.contacts, contact)) return;
+    if (std::any_of(segment.contacts.begin(), segment.contacts.end(), [&](const auto& other) {
+          return other.SameAs(contact) || AreOnOneFace(model, other, contact);
+        })) {
+      return;
+    }
     const ContactSpeeds before = SpeedsOf(model, segment.before, contact);
     const ContactSpeeds after = SpeedsOf(model, segment.after, contact);
     const double moved =

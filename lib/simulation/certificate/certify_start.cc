@@ -201,6 +201,7 @@ void RolloutCertifier::AddStart(const Model<double>& model, const EventRecord& r
   for (size_t k = 0; k < touching.size(); ++k) {
     const ActiveContact* contact = touching[k];
     touching_at_start_.push_back(island_ != nullptr ? island_->InWhole(*contact) : *contact);
+    AddFlushCorner(model, *start, *contact, 0.0);
     std::vector<JacobianEntry> gap, approach, slip;
     AddGapGradient(model, *start, *contact, &scratch, &gap);
     AddApproachGradient(model, *start, *contact, &scratch, &approach);

@@ -8,6 +8,7 @@
 #include "tangible/dynamics/model/lengths.h"
 #include "tangible/math/scalar.h"
 #include "tangible/simulation/certificate/tolerances.h"
+#include "tangible/simulation/events/flush_corners.h"
 
 namespace tangible {
 namespace {
@@ -401,13 +402,18 @@ bool HasDisc(const Model<double>& model, const ActiveContact& contact) {
                                   ShapeOfB(model, contact).type == ShapeType::kCircle);
 }
 
-// Whether the contact is among the closest features of its pair with the poses of its bodies.
+// Whether the contact is among the closest features of its pair with the poses of its bodies, or on
+// the same face of an outline as one of them.
 bool IsClosest(const Model<double>& model, const ActiveContact& contact, const Pose<double>& a,
                const Pose<double>& b) {
   ContactFeature features[2];
   const int count =
       FindFeatures(model, contact.a, a, contact.b, b, contact.Parts(), kInfinity, features);
-  return count == 0 || std::find(features, features + count, contact.feature) != features + count;
+  return count == 0 || std::any_of(features, features + count, [&](const auto& feature) {
+           ActiveContact other = contact;
+           other.feature = feature;
+           return feature == contact.feature || AreOnOneFace(model, other, contact);
+         });
 }
 
 }  // namespace

@@ -23,6 +23,7 @@
 #include "tangible/dynamics/model/driven_bodies.h"
 #include "tangible/lcp/system/contact_residual.h"
 #include "tangible/simulation/events/event_step.h"
+#include "tangible/simulation/events/flush_corners.h"
 #include "tangible/simulation/events/load_speed.h"
 #include "tangible/simulation/events/tolerances.h"
 
@@ -345,6 +346,28 @@ void EventStepper::HoldBehindEdges(const Model<double>& model, double t, double 
   if (flow_.Project(model, &part->impulses)) ++record_.num_parts;
 }
 
+// Behind a flush corner whose points are parameters the twists are those along the edge ahead, which
+// by the points have other derivatives than before.
+void EventStepper::TurnOntoEdges(const Model<double>& model, double t, const State<double>& state,
+                                 StepReport* outcome) {
+  if (t == turned_at_ ||
+      std::none_of(touching_.contacts.begin(), touching_.contacts.end(), [&](const auto& contact) {
+        return IsOverFlushCorner(model, state, contact) &&
+               std::abs(SpeedAlongFace(model, state, contact)) > SlowSpeed(model, state);
+      })) {
+    return;
+  }
+  turned_at_ = t;
+  if (AddEdge(model, t, t, {}, state, outcome) == nullptr) return;
+  EventPart* part = record_.parts[--record_.num_parts].get();
+  part->is_impulses = true;
+  part->segment.starts = true;  // what slides has friction
+  SetUpProjection(part->segment, part->segment.before, &part->impulses);
+  part->impulses.new_twist = state.twist;
+  part->impulses.holds = true;
+  if (flow_.Project(model, &part->impulses)) ++record_.num_parts;
+}
+
 bool EventStepper::Rattles(const Model<double>& model, const ActiveContact& contact) const {
   return counts_.Of(contact) > model.structure->settings.max_events_per_step / kRattling;
 }
@@ -484,8 +507,8 @@ double EventStepper::SlowSpeed(const Model<double>& model, const State<double>& 
 namespace {
 
 // Whether a closed contact of the same moving bodies carries along nearly the same row what a
-// contact that leaves has carried, as where a ball rolls from one facet of a fine curve to the next,
-// or from one of two static bodies to the other: gravity does not bring it back.
+// contact that leaves has carried, as where a ball rolls from one facet of a fine curve to the
+// next, or from one of two static bodies to the other: gravity does not bring it back.
 bool IsCarried(const Impulses& impact, size_t leaves) {
   const ContactProblem<double>& problem = impact.problem;
   const auto row_of = [&](const ContactBlock<double>& x, int block) {

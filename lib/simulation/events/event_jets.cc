@@ -87,7 +87,7 @@ class EventReplay {
     AssembleInJets(model_, *impulses, state, &problem);
     if (impulses->decompression) {
       SetOffsets(*impulses, &problem);
-    } else if (route_ == JetRoute::kUnrolled && is_impact) {
+    } else if (route_ == JetRoute::kUnrolled && is_impact && !impulses->holds) {
       const bool converged = SolveUnrolled(problem, impulses->solution, solution);
       double difference = 0.0;
       double size = 0.0;

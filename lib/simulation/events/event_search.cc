@@ -9,6 +9,7 @@
 #include "tangible/dynamics/model/driven_bodies.h"
 #include "tangible/math/scalar.h"
 #include "tangible/simulation/events/event_search_inl.h"
+#include "tangible/simulation/events/flush_corners.h"
 #include "tangible/simulation/events/load_speed.h"
 #include "tangible/simulation/events/tolerances.h"
 
@@ -527,6 +528,29 @@ void EventSearch::SearchClosed(const Model<double>& model, Event* event) {
   }
 }
 
+// Ends the motion where a contact passes a flush corner whose points are parameters.
+void EventSearch::SearchFlushCorners(const Model<double>& model, Event* event) {
+  for (const ActiveContact& contact : segment_->contacts) {
+    const FacePlace start = PlaceOnFace(model, segment_->before, contact);
+    if (!start.is_found) continue;
+    const double tolerance = GapTolerance(segment_->before, contact.a, contact.b);
+    for (const bool at_end : {false, true}) {
+      const double end = at_end ? start.to : start.from;
+      const auto left = [&](const Sample& sample) {
+        if (!sample.good) return std::numeric_limits<double>::quiet_NaN();
+        const double along = PlaceOnFace(model, sample.motion.after, contact).along;
+        return at_end ? end - along : along - end;
+      };
+      const double fa = at_end ? end - start.along : start.along - end;
+      if (!std::isfinite(end) || !(fa > tolerance)) continue;
+      const double fb = left(*At(model, event->length));
+      if (!(fb < -tolerance)) continue;
+      event->length = Refine(model, left, tolerance, 0.0, fa, event->length, fb);
+      event->kind = EventKind::kStepEnd;
+    }
+  }
+}
+
 // A bound on the speed of a driven body within the segment; 0 of others.
 double EventSearch::SpeedAlongPath(const Model<double>& model, int body, double radius) const {
   return LargestGivenSpeed(model, body, segment_->time, segment_->time + segment_->length, radius);
@@ -671,6 +695,7 @@ bool EventSearch::Run(const Model<double>& model, const std::vector<ActiveContac
   if (event.kind != EventKind::kAtOnce && !event.at_start) SearchRelease(model, &event);
   if (event.kind != EventKind::kAtOnce && !event.at_start) SearchServos(model, &event);
   if (event.kind != EventKind::kAtOnce && !event.at_start) SearchSupports(model, &event);
+  if (event.kind != EventKind::kAtOnce && !event.at_start) SearchFlushCorners(model, &event);
   ends_at_start_ = event.at_start;
   SetEvent(event, segment);
   At(model, segment->length);

@@ -182,6 +182,7 @@ class EventSearch {
   void SearchServo(const Model<double>& model, int servo, double sign, Event* event);
   void SearchSupports(const Model<double>& model, Event* event);  ///< support_bounds.cc
   void SearchStop(const Model<double>& model, int support, Event* event);
+  void SearchFlushCorners(const Model<double>& model, Event* event);
   void SearchLetsGo(const Model<double>& model, int support, Event* event);
   bool TakeDeterminedShare(const Model<double>& model, int support, SolvedNode* node,
                            SupportState* next) const;

@@ -711,6 +711,7 @@ StepReport EventStepper::Advance(const Model<double>& model, double t, double h,
   counts_.Clear();
   shortened_.Clear();
   last_rebounds_.Clear();
+  turned_at_ = -HUGE_VAL;
   search_.StartStep(model, t, h, *state);
   supports_.StartStep(*model.structure, t);
   AddEdgesAtStart(model, t, *state, &outcome);
@@ -740,6 +741,7 @@ StepReport EventStepper::Advance(const Model<double>& model, double t, double h,
     const EdgeGroup next = NextEdges(edges, now, kTimeRounding * h);
     const double goal = next.any ? next.time : end;
     const double until = now + std::ldexp(goal - now, -tries.halvings);
+    TurnOntoEdges(model, now, *state, &outcome);
     Segment& segment = BeginSegment(now, until, *state);
     const Tried tried = TryMotion(model, now, h, state, &tries, &outcome, &segment);
     if (tried == Tried::kFailed) return fail();

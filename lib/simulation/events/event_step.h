@@ -214,6 +214,8 @@ class EventStepper {
   /// behind them, takes up its hold at once: the speed that the time between gives is stopped again
   /// after a time of the same order, over a way of the second. The speed is 0, its derivative that
   /// of a projection onto what holds. The segments between edges are the parts from `first` on.
+  void TurnOntoEdges(const Model<double>& model, double t, const State<double>& state,
+                     StepReport* outcome);
   void HoldBehindEdges(const Model<double>& model, double t, double after, int first,
                        const State<double>& state, StepReport* outcome);
   /// Whether a pair has had so many events in this step that its slow impacts count as a rattle (an
@@ -282,8 +284,9 @@ class EventStepper {
   std::vector<bool> rebounds_;  ///< of the last impact's contacts
   DecompressionSolver decompression_;
   SupportModes supports_;
-  SolvedNode start_;  ///< accelerations at the start of a motion, with its supports
-  SolvedNode idle_;   ///< the same with held modes, where contacts have no load
+  double turned_at_ = 0.0;  ///< the last instant of TurnOntoEdges in the step
+  SolvedNode start_;        ///< accelerations at the start of a motion, with its supports
+  SolvedNode idle_;         ///< the same with held modes, where contacts have no load
   std::vector<ActiveContact> listed_contacts_;  ///< of it, before their modes are chosen
   std::vector<CoefficientSource> listed_friction_;
   Segment trial_;  ///< of HoldsAfter, and what it leaves as it was

@@ -7,6 +7,7 @@
 #include "tangible/dynamics/elements/contacts_ahead.h"
 #include "tangible/dynamics/elements/seam_contacts.h"
 #include "tangible/simulation/events/event_step.h"
+#include "tangible/simulation/events/flush_corners.h"
 #include "tangible/simulation/events/tolerances.h"
 
 namespace tangible {
@@ -155,6 +156,7 @@ void EventStepper::FindTouching(const Model<double>& model, const State<double>&
   for (const ActiveContact& contact : found) {
     AddTouching(model, state, contact);
   }
+  for (ActiveContact& contact : touching_.contacts) TakeEdgeAhead(model, state, &contact);
   MarkSharedVertices(model, &touching_.contacts);
 }
 

@@ -253,6 +253,10 @@ inline constexpr double kSupportGridSlack = 1e-3;
 /// The norm of the difference of two unit vectors: the direction in which a point of a support
 /// starts is found to it.
 inline constexpr double kSupportDirection = 1e-13;
+/// Of a place along a face, m, and of 1 m: nearer to a flush corner a contact is over it.
+inline constexpr double kOverCorner = 1e-11;
+/// Of 1 m, or rad: how far a body is moved to tell how a contact moves along a face.
+inline constexpr double kAheadOnFace = 1e-6;
 /// Of the lengths of two rows: with a product that falls short of them by less they are one.
 inline constexpr double kCarried = 1e-3;
 /// Of a motion: the instant at which supports that share a load let it go is located to it.

@@ -82,6 +82,7 @@ std::string RolloutFunction::Create(const Scene& scene, const std::vector<std::s
     directions_.push_back(DirectionOf(parameter));
     parameters_.push_back(std::move(parameter));
   }
+  structure_ = WithFreePoints(scene_, structure_, directions_);
   for (const std::string& path : controls) {
     error = AddControl(path);
     if (!error.empty()) return error;
@@ -153,6 +154,7 @@ RolloutFunction RolloutFunction::OfFinalState(const Scene& scene,
   for (const ParameterPath& parameter : parameters) {
     function.directions_.push_back(DirectionOf(parameter));
   }
+  function.structure_ = WithFreePoints(scene, function.structure_, function.directions_);
   function.records_ = {function.num_steps()};
   function.ReadRecords();
   function.ReadOwnValues();

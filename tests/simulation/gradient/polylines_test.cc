@@ -22,6 +22,8 @@ using test_scenes::SceneOf;
 using test_scenes::Text;
 using testing::ExpectAllAgree;
 using testing::ExpectNear;
+using testing::ExpectOthersAgree;
+using testing::Jacobian;
 
 struct RolledOnPolyline {
   RolloutReport report;
@@ -279,6 +281,61 @@ TEST(PolylineTest, DerivativesByPointsOfAClosedOutline) {
                       0.45, 0.3, 0.2),
                    {"bodies/ground/shape/points/0/x", "bodies/ground/shape/points/0/y",
                     "bodies/ground/shape/points/3/y"});
+  }
+}
+
+// A disc that passes a flush joint within a step, at 0.25 s: the slope of the edge behind it by the
+// height of its end takes g sin times the time on it, two thirds of that where it rolls.
+TEST(PolylineTest, DerivativesByThePointsBehindAFlushJoint) {
+  const char line[] = R"("polyline": {"points": [[-1, 0], [0, 0], [1, 0]], "solid": "right"})";
+  const std::vector<std::string> paths = {"bodies/ground/shape/points/2/y"};
+  for (const double dt : {0.1, 0.05, 0.03}) {
+    for (const auto& [friction, spin] :
+         {std::pair(0.0, 0.0), std::pair(0.5, -10.0), std::pair(0.1, 0.0)}) {
+      SCOPED_TRACE(Text(dt) + " " + Text(friction));
+      Scene scene = On(DiscWith(R"("position": [-0.25, 0.1], "velocity": [1, 0],
+                                   "angular_velocity": )" +
+                                Text(spin)),
+                       line, "event", 0.5, friction);
+      scene.simulation.dt = dt;
+      const GradientResult result = Jacobian(scene, paths, GradientMethod::kAdjoint);
+      ASSERT_TRUE(result.done) << result.message;
+      EXPECT_EQ(result.certificate.verdict, "trustworthy");
+      ExpectOthersAgree(scene, paths, result);
+      const double share = spin != 0.0 ? 2.0 / 3.0 : 1.0;
+      if (friction == 0.1) continue;
+      EXPECT_NEAR(result.jacobian(3, 0), -share * kGravity * 0.25, 1e-9);
+      EXPECT_NEAR(result.jacobian(0, 0), -share * kGravity * 0.03125, 1e-9);
+    }
+  }
+}
+
+// A disc that lands over one, or starts there, has two derivatives by the points, and one by where
+// it is.
+TEST(PolylineTest, OverAFlushJointTheDerivativesByPointsHaveTwoSides) {
+  const char line[] = R"("polyline": {"points": [[-1, 0], [0, 0], [1, 0]], "solid": "right"})";
+  const Scene lands = On(DiscWith(R"("position": [0, 0.5])"), line, "event", 0.4, 0.0, 0.5);
+  const std::vector<std::string> paths = {"bodies/ground/shape/points/2/y"};
+  const GradientResult both = Jacobian(lands, paths, GradientMethod::kTangent);
+  EXPECT_NE(both.certificate.verdict.find("is over a flush corner"), std::string::npos)
+      << both.certificate.verdict;
+  const double speed = std::sqrt(0.8 * kGravity);
+  for (const DerivativeSide side : {DerivativeSide::kPlus, DerivativeSide::kMinus}) {
+    const GradientResult one = FinalStateJacobian(
+        lands, testing::Resolve(lands, paths), {.method = GradientMethod::kTangent, .side = side});
+    ASSERT_TRUE(one.done) << one.message;
+    EXPECT_NEAR(one.jacobian(3, 0), side == DerivativeSide::kPlus ? -1.5 * speed : 0.0, 1e-6);
+  }
+  for (const char* stepping : {"fixed", "event"}) {
+    const Scene starts =
+        On(DiscWith(R"("position": [0, 0.1], "velocity": [1, 0])"), line, stepping, 0.4, 0.0);
+    EXPECT_NE(Jacobian(starts, paths, GradientMethod::kTangent)
+                  .certificate.verdict.find("is over a flush corner"),
+              std::string::npos);
+    const GradientResult place =
+        Jacobian(starts, {"bodies/b/position/x"}, GradientMethod::kTangent);
+    EXPECT_EQ(place.certificate.verdict, "trustworthy");
+    EXPECT_NEAR(place.jacobian(0, 0), 1.0, 1e-12);
   }
 }
 

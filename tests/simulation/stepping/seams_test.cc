@@ -585,8 +585,8 @@ TEST(SeamsTest, ABowlOfFacetsTendsToTheSmoothOne) {
   EXPECT_NEAR(highest(72, Stepping::kEvent), 58.0, 1.0);
 }
 
-// A disc that passes to a floor that rises by so little that it leaves the first one more slowly than
-// gravity would bring it back: v − g a (T − t) at a slope a, and by v 1 − g a t / v.
+// A disc that passes to a floor that rises by so little that it leaves the first one more slowly
+// than gravity would bring it back: v − g a (T − t) at a slope a, and by v 1 − g a t / v.
 TEST(SeamsTest, ADiscPassesToANearlyParallelFloor) {
   for (const auto& [slope, speed] :
        {std::pair(1e-4, 0.1), std::pair(1e-3, 0.01), std::pair(1e-5, 1.0), std::pair(1e-6, 1.0)}) {
