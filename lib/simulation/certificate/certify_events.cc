@@ -576,9 +576,10 @@ void RolloutCertifier::AddHandOversAtEnd(const Model<double>& model, long step,
   }
 }
 
-// Events at the run's last instant, or at one at which a state is read, or just before or behind it:
-// beside it they have happened or not, which is another derivative of twists, or other twists. Positions have the same on both
-// sides, as do all where forces change gradually (a start of sliding, a lift-off).
+// Events at the run's last instant, or at one at which a state is read, or just before or behind
+// it: beside it they have happened or not, which is another derivative of twists, or other twists.
+// Positions have the same on both sides, as do all where forces change gradually (a start of
+// sliding, a lift-off).
 void RolloutCertifier::AddEnd(const Model<double>& model, long step, const EventRecord& record) {
   const ModelStructure& s = *model.structure;
   const double dt = s.settings.dt;

@@ -15,8 +15,8 @@
 // S, per unit of the parameter, in m or m/s, at the radius of gyration for an angle:
 // the largest change of a pose (of a twist) of any body that the direction causes during the run,
 // or, if that is more, the largest coordinate (speed) of any body during the run, over the
-// parameter's size. The speed of the free motion counts too: the speed that gravity or a motor would
-// add in a step to a body at rest and that contacts or supports cancel.
+// parameter's size. The speed of the free motion counts too: the speed that gravity or a motor
+// would add in a step to a body at rest and that contacts or supports cancel.
 //
 // So gap ≤ 1e-10 means |a − b| ≤ 1e-10 |b| + 1e-14 S: for a change of the parameter by its whole
 // size the second term is 1e-14 of the output. The magnitudes of an adjoint's terms, |w̄|ᵀ |d|, are

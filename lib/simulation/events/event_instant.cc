@@ -346,8 +346,8 @@ void EventStepper::HoldBehindEdges(const Model<double>& model, double t, double 
   if (flow_.Project(model, &part->impulses)) ++record_.num_parts;
 }
 
-// Behind a flush corner whose points are parameters the twists are those along the edge ahead, which
-// by the points have other derivatives than before.
+// Behind a flush corner whose points are parameters the twists are those along the edge ahead,
+// which by the points have other derivatives than before.
 void EventStepper::TurnOntoEdges(const Model<double>& model, double t, const State<double>& state,
                                  StepReport* outcome) {
   if (t == turned_at_ ||
