@@ -176,6 +176,11 @@ bool ReadDeepLabCut(std::string text, const std::string& file, CsvTable* table, 
     return CleanedName(individuals.empty() ? parts[i] : individuals[i] + "." + parts[i]);
   };
   for (size_t i = 1; i < parts.size(); ++i) {
+    if (parts[i].empty() || (!individuals.empty() && individuals[i].empty())) {
+      *error = file + ": line " + std::to_string(num_headers - 1) + ", column " +
+               std::to_string(i + 1) + ": expected the name of a point, got none";
+      return false;
+    }
     if (coords[i] == "likelihood") {
       likelihood[name_of(i)] = static_cast<int>(i);
     } else if (coords[i] == "x" || coords[i] == "y") {
@@ -382,7 +387,7 @@ class RowCollector {
     const auto first = std::min_element(
         moments.begin(), moments.end(),
         [](const Moment& a, const Moment& b) { return a.clock.Since(b.clock) < 0.0L; });
-    if (first->time < kClockTime) return nullptr;
+    if (first->time <= kClockTime) return nullptr;
     recording_->start = first->time;
     return &*first;
   }

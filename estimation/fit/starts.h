@@ -32,7 +32,8 @@ struct Nudge {
   bool inwards;
   double fraction;
 };
-inline constexpr Nudge kNudges[] = {{true, 0.1}, {true, 0.01}, {false, 0.5}, {false, 0.9}};
+inline constexpr Nudge kNudges[] = {{true, 0.1},  {true, 0.01}, {false, 0.5},
+                                    {false, 0.9}, {false, 0.1}, {false, 0.01}};
 
 /// `p` with this parameter moved.
 Eigen::VectorXd Nudged(const ParameterEntry& entry, int parameter, const Nudge& nudge,

@@ -253,13 +253,18 @@ int Main(int argc, char** argv) {
   if (!wrong.empty()) {
     return ReportError("tangible-gradient: " + wrong, kExitUsage);
   }
+  if (FLAGS_step > 0.0 && options.method != GradientMethod::kFiniteDifference) {
+    ReportError(line.positional[0] +
+                ": warning: --step does nothing without --method=finite_difference");
+  }
   try {
     return Run(line.positional[0], options);
   } catch (const std::bad_alloc&) {
     return ReportError(line.positional[0] +
-                       ": not enough memory: the adjoint keeps the records of "
-                       "all steps, and needs less with --checkpoint=budget:MIB; a tangent needs "
-                       "less with fewer --parameters at once");
+                       ": not enough memory: the adjoint keeps the records of all steps, and "
+                       "needs less with --checkpoint=budget:MIB; the certificate's radius keeps "
+                       "their choices, and needs nothing with --radius=false; a tangent needs less "
+                       "with fewer --parameters at once");
   }
 }
 

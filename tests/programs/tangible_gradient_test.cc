@@ -243,6 +243,14 @@ TEST_F(TangibleGradientTest, CheckpointsBoundTheMemoryAndChangeNothing) {
   ExpectOneLine(Differentiate(parameters + "--checkpoint=budget:0.001"), 1, "budget of 1049 bytes");
 }
 
+TEST_F(TangibleGradientTest, AStepWithoutDifferencesIsWarnedOf) {
+  const ProgramRun run = Differentiate("--parameters=bodies/ball/mass --step=1e-6");
+  EXPECT_EQ(run.exit_status, 0);
+  EXPECT_NE(run.error.find("--step does nothing without --method=finite_difference"),
+            std::string::npos)
+      << run.error;
+}
+
 TEST_F(TangibleGradientTest, WrongFlagsAreUsage) {
   const std::string parameters = "--parameters=bodies/ball/mass ";
   ExpectOneLine(Differentiate(""), 2, "--parameters");

@@ -223,20 +223,37 @@ bool OwnSignalSteps(const ModelStructure& structure, const ForceIndex& force, do
       });
 }
 
-bool JumpPullsJoint(const Model<double>& model, double time) {
+namespace {
+
+// Calls visit(path) for the paths whose rate jumps at a time.
+template <typename Visit>
+void ForEachJump(const Model<double>& model, double time, const Visit& visit) {
   const ModelStructure& s = *model.structure;
-  bool pulls = false;
   ForEachKnot(model, BesideInstant(s, time, PathSide::kBefore),
               BesideInstant(s, time, PathSide::kAfter), [&](const Edge& edge) {
                 if (edge.gives_way || !IsSameInstant(s, edge.time, time)) return;
                 for (const PathIndex& path : s.paths) {
-                  if (path.numbers + kPathDelay != edge.window.number) continue;
-                  for (const JointIndex& joint : s.joints) {
-                    pulls = pulls || joint.a == path.body || joint.b == path.body;
-                  }
+                  if (path.numbers + kPathDelay == edge.window.number) visit(path);
                 }
               });
+}
+
+}  // namespace
+
+bool JumpPullsJoint(const Model<double>& model, double time) {
+  bool pulls = false;
+  ForEachJump(model, time, [&](const PathIndex& path) {
+    for (const JointIndex& joint : model.structure->joints) {
+      pulls = pulls || joint.a == path.body || joint.b == path.body;
+    }
+  });
   return pulls;
+}
+
+bool PathJumps(const Model<double>& model, double time) {
+  bool jumps = false;
+  ForEachJump(model, time, [&](const PathIndex&) { jumps = true; });
+  return jumps;
 }
 
 double JustBefore(const Model<double>& model, double t) {

@@ -92,6 +92,9 @@ void AddEdgesToCome(const Model<double>& model, const Segment& segment,
 /// Whether the speed of a driven body jumps at `time` to which a joint holds another body.
 bool JumpPullsJoint(const Model<double>& model, double time);
 
+/// Whether the speed of a driven body jumps at `time`.
+bool PathJumps(const Model<double>& model, double time);
+
 /// Times at which forces, signals and paths are read for a motion that ends or starts at t.
 double JustBefore(const Model<double>& model, double t);
 double JustAfter(const Model<double>& model, double t);

@@ -730,7 +730,8 @@ StepReport EventStepper::Advance(const Model<double>& model, double t, double h,
   if (!FollowAfter(model, t, state, &outcome)) return fail();
   while (end - now > kTimeRounding * h || !at_given_time) {
     const bool at_end = end - now <= kTimeRounding * h;
-    if (!SolveInstant(model, now, h, std::exchange(begins, false), at_end, state, &outcome)) {
+    if (!SolveInstantOrBehind(model, now, h, std::exchange(begins, false), at_end, state,
+                              &outcome)) {
       return fail();
     }
     if (at_end) break;

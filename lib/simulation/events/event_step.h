@@ -145,6 +145,8 @@ class EventStepper {
                    StepReport* outcome);
   bool SolveInstant(const Model<double>& model, double now, double h, bool begins, bool at_end,
                     State<double>* state, StepReport* outcome);
+  bool SolveInstantOrBehind(const Model<double>& model, double now, double h, bool begins,
+                            bool at_end, State<double>* state, StepReport* outcome);
   /// At a step's start and past an edge: puts driven bodies on the side after it, and takes the
   /// bodies that joints hold to them along.
   bool FollowAfter(const Model<double>& model, double now, State<double>* state,

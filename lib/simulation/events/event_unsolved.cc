@@ -4,7 +4,10 @@
 // very short step (Painlevé), and contacts that are held.
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
+#include "tangible/dynamics/model/driven_bodies.h"
+#include "tangible/simulation/events/event_edges.h"
 #include "tangible/simulation/events/event_step.h"
 #include "tangible/simulation/events/tolerances.h"
 
@@ -155,6 +158,27 @@ bool EventStepper::HoldsTouching(const Model<double>& model, double t, State<dou
   AssembleImpulses(model, &assembly_, &impulses);
   if (!impulses.contacts.empty() && HoldsSlow(model, &impulses, state, outcome)) return true;
   --record_.num_parts;
+  return false;
+}
+
+// A driven body that turns back just as it reaches what it would crush has turned back.
+bool EventStepper::SolveInstantOrBehind(const Model<double>& model, double now, double h,
+                                        bool begins, bool at_end, State<double>* state,
+                                        StepReport* outcome) {
+  const bool turns = !model.structure->paths.empty() && PathJumps(model, now);
+  if (!turns) return SolveInstant(model, now, h, begins, at_end, state, outcome);
+  const int parts = record_.num_parts;
+  const bool starts = guess_.starts;
+  const State<double> before = *state;
+  if (SolveInstant(model, now, h, begins, at_end, state, outcome)) return true;
+  const std::string message = std::exchange(outcome->message, "");
+  record_.num_parts = parts;
+  guess_.starts = starts;
+  *state = before;
+  inside_ = JustAfter(model, now);
+  FollowPaths(model, now, inside_, state);
+  if (SolveInstant(model, now, h, begins, at_end, state, outcome)) return true;
+  outcome->message = message;
   return false;
 }
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "tangible/dynamics/model/driven_bodies.h"
 #include "tangible/dynamics/model/lengths.h"
 #include "tangible/dynamics/model/tolerances.h"
 #include "tangible/simulation/stepping/invariants.h"
@@ -108,6 +109,43 @@ std::string EnergyOfOverlap(const Model<double>& model, const State<double>& ini
                 "the energy grew from %.4g J to %.4g J as bodies that overlap, by up to %.3g m, "
                 "were pushed apart: expected a start at which no bodies overlap",
                 watch.start(), KineticEnergy(model, final) + PotentialEnergy(model, final), depth);
+  return text;
+}
+
+std::string EnergyOfSqueeze(const Model<double>& model, const State<double>& initial,
+                            const State<double>& final) {
+  const ModelStructure& s = *model.structure;
+  const auto is_driven = [&](const JointIndex& joint) {
+    return joint.motor >= 0 || joint.effort >= 0 || joint.effort_signal >= 0;
+  };
+  if (!s.forces.empty() || !s.servos.empty() || !s.springs.empty() ||
+      std::any_of(s.joints.begin(), s.joints.end(), is_driven)) {
+    return "";
+  }
+  const Lengths lengths(model);
+  double fastest = 0.0;  // of what is driven
+  for (int body = 0; body < s.num_bodies(); ++body) {
+    if (s.bodies[body].block >= 0) continue;
+    const double* v = &initial.twist[3 * static_cast<size_t>(body)];
+    const double radius = lengths.radius(body);
+    fastest = std::max({fastest, std::hypot(v[0], v[1]) + std::abs(v[2]) * radius,
+                        LargestGivenSpeed(model, body, 0.0, s.settings.duration, radius)});
+  }
+  double given = 0.0;
+  for (const int body : s.moving) {
+    given += 0.5 * model.parameters[s.bodies[body].mass] * fastest * fastest;
+  }
+  const double kinetic = KineticEnergy(model, final);
+  const double had = KineticEnergy(model, initial) +
+                     std::max(0.0, PotentialEnergy(model, initial) - PotentialEnergy(model, final));
+  if (fastest == 0.0 || !(kinetic > kSqueezed * given + 2.0 * had)) return "";
+  char text[320];
+  std::snprintf(
+      text, sizeof text,
+      "bodies that are pressed together by bodies of given motion, which move at up to %.3g "
+      "m/s, end with %.4g J: what is squeezed along a line leaves it at any speed; expected "
+      "room for them, or a force in place of the motion",
+      fastest, kinetic);
   return text;
 }
 

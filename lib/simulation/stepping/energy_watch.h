@@ -38,6 +38,11 @@ class EnergyWatch {
 std::string EnergyOfOverlap(const Model<double>& model, const State<double>& initial,
                             const State<double>& final, double depth);
 
+/// Empty, or a line that bodies end far faster than those of given motion, which alone drive them:
+/// what these press together along a line leaves it at any speed.
+std::string EnergyOfSqueeze(const Model<double>& model, const State<double>& initial,
+                            const State<double>& final);
+
 /// Empty, or a line that the energy of a run by events has grown, though nothing drives the scene:
 /// a step that is too long for the motion. Empty for semi-implicit Euler steps, whose energy
 /// varies and which have a warning of their own. `by_impacts`: J, what impacts may have added

@@ -89,6 +89,7 @@ std::vector<std::string> RunWarnings::Finish(const Model<double>& model,
   std::vector<std::string> lines;
   std::string energy = report.energy_grown;
   if (energy.empty()) energy = EnergyOfOverlap(model, initial_, final, report.penetration_max);
+  if (energy.empty()) energy = EnergyOfSqueeze(model, initial_, final);
   for (std::string line :
        {coordinates_.Message(model), joints_.Message(model), BrokenLimitMessage(model, initial_),
         FlushStepsMessage(model), behind_, std::move(energy)}) {

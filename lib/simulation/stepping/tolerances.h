@@ -36,6 +36,8 @@ inline constexpr double kLastShiftedStep = 1e-14;
 inline constexpr double kEnergyGrowth = 0.01;
 /// The same where fixed steps have pushed bodies apart that overlap deeply.
 inline constexpr double kGrownByOverlap = 1e-3;
+/// Of the kinetic energy of all bodies at the speed of what drives them: more is reported.
+inline constexpr double kSqueezed = 1e4;
 /// Of a step of Newton's method: the shortest part of it that is tried; then descent follows.
 inline constexpr double kShortestNewton = 1e-3;
 /// Of a step of descent: the shortest part of it that is tried.

@@ -496,6 +496,9 @@ TEST(RecordingTableTest, MistakesAreOneLine) {
   other.frame_rate = 1.0;
   EXPECT_NE(Import(good, other).error.find("r.csv: header: expected rows that begin with scorer"),
             std::string::npos);
+  EXPECT_NE(Import("scorer,n\nbodyparts,\ncoords,x\n0,1\n", other)
+                .error.find("line 2, column 2: expected the name of a point"),
+            std::string::npos);
   EXPECT_NE(Import("scorer,n\nbodyparts,a\ncoords,z\n0,1\n", other).error.find("got \"z\""),
             std::string::npos);
   other.format = TableFormat::kTracker;

@@ -172,6 +172,28 @@ TEST(FitTest, AParameterThatActsByJumpsAloneIsNotWithoutEffect) {
       << fit.message;
 }
 
+// A window that ends with the last observation: a later end does nothing, an earlier one does.
+TEST(FitTest, AnEndAtTheLastObservationIsNotWithoutEffect) {
+  const Scene scene = MakeScene(R"({"gravity": [0, 0], "bodies": [
+      {"name": "a", "mass": 1, "inertia": 1, "position": [0, 0]}],
+    "forces": [{"name": "f", "body": "a", "force": [3, 0], "end": 0.3}],
+    "simulation": {"stepping": "event", "dt": 0.02, "duration": 1}})");
+  std::vector<Observation> observations;
+  for (const auto& [time, speed] :
+       {std::pair(0.1, 0.3), std::pair(0.2, 0.6), std::pair(0.3, 0.75)}) {
+    Observation one;
+    one.body = 0;
+    one.coordinate = Coordinate::kVx;
+    one.time = time;
+    one.value = speed;
+    one.sigma = 0.01;
+    observations.push_back(one);
+  }
+  const FitResult fit = FitTo(scene, {Parameter("forces/f/end", 0.3)}, observations);
+  ASSERT_EQ(fit.status, FitStatus::kConverged) << fit.message;
+  EXPECT_NEAR(fit.estimate[0], 0.25, 1e-9);
+}
+
 // With more friction than stops a disc's lowest point in its impact it does nothing at the start.
 TEST(FitTest, FrictionIsFoundFromAStartAtWhichItSticks) {
   const Scene scene = MakeScene(R"({"bodies": [

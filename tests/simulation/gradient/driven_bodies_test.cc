@@ -468,5 +468,26 @@ TEST(DrivenBodiesTest, WhatAPathThatJumpsMeetsIsDiscontinuous) {
   }
 }
 
+// A wall that turns back just where a ball has no room left crushes nothing. It reaches the ball on
+// a step's end, within a step, and as the run ends.
+TEST(DrivenBodiesTest, AWallThatTurnsBackAtABodyDoesNotCrushIt) {
+  for (const double dt : {0.01, 0.07}) {
+    for (const double duration : {2.0, 1.0}) {
+      const Finished run = DrivenRun(SceneOf(
+          R"({"gravity": [0, 0], "bodies": [
+          {"name": "b", "mass": 1, "shape": {"circle": {"radius": 0.1}}, "position": [0, 0]},
+          {"name": "k", "kinematic": true, "shape": {"half_plane": {"normal": [1, 0], "offset": 0}},
+           "motion": {)" +
+          Series({0.0, 1.0, 2.0}, {{"x", [](double t) { return t == 1.0 ? -0.1 : -0.5; }}}) +
+          R"(, "interpolation": "linear"}},
+          {"name": "w", "static": true, "shape": {"half_plane": {"normal": [-1, 0],
+           "offset": -0.1}}}])" +
+          DrivenFor("event", dt, duration)));
+      EXPECT_EQ(run.final.pose[0], 0.0) << dt;
+      EXPECT_EQ(run.final.twist[0], 0.0) << dt;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace tangible

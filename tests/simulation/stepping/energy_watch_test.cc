@@ -97,5 +97,23 @@ TEST(EnergyWatchTest, RoundingOfBodiesAtRestIsNoGrowth) {
   }
 }
 
+// A hundred times faster than the only thing that drives it is what was squeezed out of a corner.
+TEST(EnergyWatchTest, WhatIsSqueezedOutIsReported) {
+  Model<double> model;
+  State<double> start;
+  BuildModel(test_scenes::SceneOf(R"({"gravity": [0, 0], "bodies": [
+      {"name": "a", "mass": 1, "inertia": 1, "position": [0, 0], "velocity": [0.1, 0]},
+      {"name": "k", "kinematic": true, "shape": {"circle": {"radius": 0.1}}, "position": [1, 0],
+       "velocity": [0.5, 0]}]})"),
+             &model, &start);
+  State<double> end = start;
+  end.twist[0] = 20.0;
+  EXPECT_EQ(EnergyOfSqueeze(model, start, end), "");
+  end.twist[0] = 60.0;
+  EXPECT_NE(EnergyOfSqueeze(model, start, end).find("move at up to 0.5 m/s, end with 1800 J"),
+            std::string::npos)
+      << EnergyOfSqueeze(model, start, end);
+}
+
 }  // namespace
 }  // namespace tangible
