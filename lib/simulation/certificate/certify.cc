@@ -431,6 +431,7 @@ void RolloutCertifier::AddStep(const Model<double>& model, long step, Stepper* s
   const ModelStructure& s = *model.structure;
   landing_.clear();
   const ContactScales scales(record.problem, record.solution);
+  AddFacesAcross(model, record.before, record.contacts, record.solution.modes, record.time);
   std::vector<ActiveContact> closed;
   for (size_t i = 0; i < record.contacts.size(); ++i) {
     const ActiveContact& contact = record.contacts[i];

@@ -159,6 +159,9 @@ class RolloutCertifier {
   /// that of the edge on one side.
   void AddFlushCorner(const Model<double>& model, const State<double>& state,
                       const ActiveContact& contact, double time);
+  void AddFacesAcross(const Model<double>& model, const State<double>& state,
+                      const std::vector<ActiveContact>& contacts,
+                      const std::vector<ContactMode>& modes, double time);
   void AddLimitsAtRelease(const Model<double>& model, long step, const Segment& segment);
   void AddClosedAtOnce(const Model<double>& model, long step, const Segment& segment);
   void AddTwoLimits(const Model<double>& model, long step, const Segment& segment);

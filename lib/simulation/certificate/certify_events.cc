@@ -365,10 +365,13 @@ void RolloutCertifier::AddStoppedDead(const Model<double>& model, long step,
 
 namespace {
 
-// Of bodies that rest on their supports without a load, forces are rounding beside what these could
-// hold.
-double RoundingOfHeld(const Model<double>& model) {
+// Forces between bodies that need none are rounding: beside what their supports could hold, and
+// beside the loads of bodies, as drags that are equal.
+double RoundingOfForces(const Model<double>& model, const ContactProblem<double>& problem) {
   double rounding = 0.0;
+  for (size_t i = 0; i < problem.load.size(); ++i) {
+    if (i % 3 != 2) rounding = std::max(rounding, kForceTolerance * std::abs(problem.load[i]));
+  }
   for (const SupportIndex& support : model.structure->supports) {
     const double* x = &model.parameters[support.numbers];
     rounding =
@@ -393,7 +396,7 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
       largest = std::max(largest, share.normal_impulse[i]);
     }
   }
-  const double rounding = RoundingOfHeld(model);
+  const double rounding = RoundingOfForces(model, start.problem);
   // The motion that follows an instant starts with the same forces, and knows which contacts at
   // their limit it releases.
   const bool motion_follows = segment->length == 0.0 && segment->event == EventKind::kStepEnd;
@@ -407,7 +410,9 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
       certificate_.degenerate_rows += margin < kDegenerateTolerance ? 1 : 0;
     };
     if (!contact.IsPureFriction()) {
-      if (!motion_follows) add_margin(largest > 0.0 ? normal / largest : 0.0, "normal force");
+      if (!motion_follows) {
+        add_margin(largest > rounding ? normal / largest : 0.0, "normal force");
+      }
       if (normal > std::max(kLoaded * largest, rounding)) {
         loaded_.push_back(contact);
       }
@@ -717,6 +722,13 @@ void RolloutCertifier::AddIsland(const Model<double>& model, long step, EventDer
       continue;
     }
     AddSegment(model, step, derivative, &part.segment);
+    AddFacesAcross(model, part.segment.before, part.segment.contacts, part.segment.modes,
+                   part.segment.time);
+    // An impact has the friction of rest, which a corner that is passed without one has not.
+    for (size_t i = 0; model.structure->friction_decays && i < part.segment.contacts.size(); ++i) {
+      if (SlidingSign(part.segment.modes[i]) == 0.0) continue;
+      AddFlushCorner(model, part.segment.before, part.segment.contacts[i], part.segment.time);
+    }
     if (part.segment.length > 0.0) impact_ = nullptr;
     missed_ = std::min(missed_ + MissedBy(part.segment), kMostMissed);
     if (part.segment.IsEventLocated()) {

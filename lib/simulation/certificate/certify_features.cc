@@ -70,6 +70,23 @@ bool RolloutCertifier::LeaveOutFeatures(const Model<double>& model, const State<
   return true;
 }
 
+// A face across a flush corner: raised, the corner carries it; lowered, the ends of the face do.
+void RolloutCertifier::AddFacesAcross(const Model<double>& model, const State<double>& state,
+                                      const std::vector<ActiveContact>& contacts,
+                                      const std::vector<ContactMode>& modes, double time) {
+  for (size_t i = 1; i < contacts.size(); ++i) {
+    if (modes[i] == ContactMode::kOpen || !contacts[i].IsOfShapes()) continue;
+    const FacePlace place = PlaceOnFace(model, state, contacts[i]);
+    for (size_t k = 0; place.is_found && k < i; ++k) {
+      if (modes[k] == ContactMode::kOpen || !contacts[k].IsOfTheSameShapes(contacts[i])) continue;
+      const FacePlace other = PlaceOnFace(model, state, contacts[k]);
+      if (!other.is_found || other.edge == place.edge) continue;
+      OneSided("a face lies across a flush corner, " + ContactName(*model.structure, contacts[i]) +
+               " at t = " + Short(time) + " s, whose points are parameters");
+    }
+  }
+}
+
 void RolloutCertifier::AddFlushCorner(const Model<double>& model, const State<double>& state,
                                       const ActiveContact& contact, double time) {
   if (!IsOverFlushCorner(model, state, contact)) return;

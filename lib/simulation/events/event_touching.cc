@@ -156,7 +156,12 @@ void EventStepper::FindTouching(const Model<double>& model, const State<double>&
   for (const ActiveContact& contact : found) {
     AddTouching(model, state, contact);
   }
-  for (ActiveContact& contact : touching_.contacts) TakeEdgeAhead(model, state, &contact);
+  for (size_t i = 0; i < touching_.contacts.size(); ++i) {
+    ActiveContact& contact = touching_.contacts[i];
+    // Rolling friction keeps the feature of its contact, which stands before it.
+    if (contact.is_rolling && i > 0) contact.feature = touching_.contacts[i - 1].feature;
+    if (contact.IsOfShapes()) TakeEdgeAhead(model, state, &contact);
+  }
   MarkSharedVertices(model, &touching_.contacts);
 }
 

@@ -238,8 +238,9 @@ inline constexpr double kSupportTurn = 1.0 / 16.0;
 /// Times the rate at which friction turns a velocity into the direction of its point's motion: a
 /// motion is no longer, by which one of fourth order is stable and its error as small as above.
 inline constexpr double kSupportDecay = 0.5;
-/// Of that rate: what joints and contacts may leave of it to be counted.
-inline constexpr double kMostLeft = 0.25;
+/// Of that rate: what joints and contacts may leave of it to count, at the start of a motion. A
+/// body that a hinge drags along turns its velocity, and loses what held it across.
+inline constexpr double kMostLeft = 1e-6;
 /// Of the rate before: a body whose centre is stopped and that a joint keeps from turning about it
 /// has a smaller one by rounding alone.
 inline constexpr double kStoppedTurn = 1e-9;

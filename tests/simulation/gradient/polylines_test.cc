@@ -339,5 +339,23 @@ TEST(PolylineTest, OverAFlushJointTheDerivativesByPointsHaveTwoSides) {
   }
 }
 
+// Rolling friction goes on behind a flush joint, also where motions end there: the speed falls by
+// (ρ g / r) t / 1.5.
+TEST(PolylineTest, RollingFrictionPassesAFlushJoint) {
+  const char line[] = R"("polyline": {"points": [[-1, 0], [0, 0], [1, 0]], "solid": "right"})";
+  for (const double dt : {0.1, 0.01}) {
+    Scene scene = On(DiscWith(R"("position": [-0.25, 0.1], "velocity": [1, 0],
+                                 "angular_velocity": -10)"),
+                     line, "event", 0.5, 0.5);
+    scene.simulation.dt = dt;
+    for (BasicBody<double>& body : scene.bodies) body.rolling_friction = 0.01;
+    const std::vector<std::string> paths = {"bodies/ground/shape/points/2/y"};
+    const GradientResult result = Jacobian(scene, paths, GradientMethod::kAdjoint);
+    EXPECT_EQ(result.certificate.verdict, "trustworthy");
+    EXPECT_NEAR(result.values[3], 1.0 - 0.1 * kGravity * 0.5 / 1.5, 1e-9);
+    ExpectOthersAgree(scene, paths, result);
+  }
+}
+
 }  // namespace
 }  // namespace tangible

@@ -738,5 +738,29 @@ TEST(SupportsByEventsTest, AHingesLimitWhereItStopsIsAKink) {
   }
 }
 
+// Boxes that slide along side by side need no force between them, which rounding makes one: the
+// derivative by the speed of the first is another one where it is slower.
+TEST(SupportsByEventsTest, TouchingBoxesThatSlideAlongAreAKink) {
+  std::string bodies;
+  for (int i = 0; i < 3; ++i) {
+    bodies += std::string(i > 0 ? ", " : "") + R"({"name": "d)" + std::to_string(i) +
+              R"(", "mass": 1, "shape": {"box": {"size": [0.25, 0.25]}}, "velocity": [1, 0],
+                  "support": {"friction": 0.2, "load": 10}, "position": [)" +
+              std::to_string(0.25 * i) + ", 0]}";
+  }
+  const Scene scene = SceneOf(R"({"gravity": [0, 0], "bodies": [)" + bodies +
+                              R"(], "simulation": {"dt": 0.01, "duration": 1,
+                                  "stepping": "event"}})");
+  const std::vector<std::string> paths = {"bodies/d0/velocity/x"};
+  const GradientResult both = Jacobian(scene, paths, GradientMethod::kTangent);
+  EXPECT_EQ(both.certificate.verdict.find("near a kink"), 0u) << both.certificate.verdict;
+  const GradientResult slower =
+      FinalStateJacobian(scene, testing::Resolve(scene, paths),
+                         {.method = GradientMethod::kTangent, .side = DerivativeSide::kMinus});
+  ASSERT_TRUE(slower.done) << slower.message;
+  EXPECT_NEAR(slower.jacobian(0, 0), 0.5, 1e-6);
+  EXPECT_NEAR(slower.jacobian(6, 0), 0.0, 1e-6);
+}
+
 }  // namespace
 }  // namespace tangible
