@@ -8,6 +8,7 @@
 #include "tangible/math/cubic_spline.h"
 #include "tangible/scene/csv.h"
 #include "tangible/scene/json_reader.h"
+#include "tangible/scene/tolerances.h"
 
 namespace tangible {
 namespace {
@@ -58,7 +59,17 @@ RecordedPath::Point RecordedPath::At(int column, double time, double inside) con
 
 bool RecordedPath::JumpsAt(int k) const {
   const int last = static_cast<int>(series_.time.size()) - 1;
-  return last > 0 && (series_.interpolation == PathInterpolation::kLinear || k == 0 || k == last);
+  if (series_.interpolation != PathInterpolation::kLinear && k > 0 && k < last) return false;
+  for (int column = 0; column < kNumColumns; ++column) {
+    if (!Has(column)) continue;
+    const auto i = static_cast<std::size_t>(k);
+    const double before = k > 0 ? At(column, series_.time[i], series_.time[i - 1]).rate : 0.0;
+    const double after = k < last ? pieces_[column][i].rate : 0.0;
+    if (std::abs(after - before) > kEqualRates * std::max(std::abs(before), std::abs(after))) {
+      return true;
+    }
+  }
+  return false;
 }
 
 double RecordedPath::LargestRate(int column, double from, double to) const {

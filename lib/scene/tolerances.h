@@ -22,5 +22,7 @@ inline constexpr double kRopeRounding = 1e-9;
 /// Of the sum of the magnitudes of the rates that a coupling adds: their sum may be off from 0 by
 /// this much, because rates are written with rounding.
 inline constexpr double kCoupledRates = 1e-9;
+/// Of the larger of two rates of a path: they are equal to the rounding of its knots.
+inline constexpr double kEqualRates = 1e-12;
 
 }  // namespace tangible

@@ -59,6 +59,11 @@ TEST(RecordedPathTest, LinearPathsJumpAtKnotsAndTheEndsAreHeld) {
   EXPECT_EQ(path.At(0, 7.0, 7.0).value, -2.0);
   EXPECT_EQ(path.At(0, 7.0, 7.0).rate, 0.0);
   for (int k = 0; k < 3; ++k) EXPECT_TRUE(path.JumpsAt(k));
+  // Held at first and in the end, and on a straight line between: only two knots are corners.
+  series.time = {0.0, 0.2, 0.7, 1.2, 2.0};
+  series.x = {-0.3, -0.3, -0.05, 0.2, 0.2};
+  const RecordedPath straight(series);
+  for (int k = 0; k < 5; ++k) EXPECT_EQ(straight.JumpsAt(k), k == 1 || k == 3) << k;
   const RecordedPath cubic(Wave(PathInterpolation::kCubic));
   for (int k = 0; k < 5; ++k) EXPECT_EQ(cubic.JumpsAt(k), k == 0 || k == 4);
 }

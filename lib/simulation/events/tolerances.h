@@ -229,7 +229,7 @@ inline constexpr double kSlowSupport = 1e-6;
 /// this speed, below which its friction would turn its direction much faster than a time step.
 inline constexpr double kStartingSupport = 0.05;
 /// Cosine: within this angle of its acceleration a slow body counts as starting.
-inline constexpr double kStartingAlong = 0.99;
+inline constexpr double kStartingAlong = 0.999999;
 /// Of dt: the first motion of a body that its support lets go.
 inline constexpr double kFirstOfSupport = 1e-3;
 /// A motion changes the velocity of a point on a support by no more than this share; the error of a

@@ -762,5 +762,24 @@ TEST(SupportsByEventsTest, TouchingBoxesThatSlideAlongAreAKink) {
   EXPECT_NEAR(slower.jacobian(6, 0), 0.0, 1e-6);
 }
 
+// A trailer that a hinge drags sideways at 0.02 m/s turns about its own support, and then follows
+// slowly: its friction is against its velocity, which is not along its acceleration. The values are
+// those of an implicit integration (Radau, 1e-11).
+TEST(SupportsByEventsTest, ASlowTrailerHasFrictionAgainstItsVelocity) {
+  const Scene scene = SceneOf(R"({"gravity": [0, 0], "bodies": [
+      {"name": "k", "kinematic": true, "position": [0, 0], "velocity": [0, 0.02]},
+      {"name": "b", "mass": 1, "inertia": 0.1, "position": [0.5, 0], "velocity": [0, 0.02],
+       "support": {"friction": 0.2, "load": 10}}],
+      "joints": [{"name": "h", "type": "revolute", "bodies": ["b", "k"], "anchor": [0, 0]}],
+      "simulation": {"dt": 0.01, "duration": 1, "stepping": "event"}})");
+  const GradientResult result =
+      Jacobian(scene, {"bodies/b/support/friction"}, GradientMethod::kTangent);
+  ASSERT_TRUE(result.done) << result.message;
+  EXPECT_NEAR(result.values[2], -0.0397096, 3e-6);
+  EXPECT_NEAR(result.values[5], -0.0399685, 4e-6);
+  EXPECT_NEAR(result.jacobian(2, 0), -1.40e-3, 5e-5);
+  EXPECT_NEAR(result.jacobian(5, 0), 2.4e-6, 2e-5);
+}
+
 }  // namespace
 }  // namespace tangible
