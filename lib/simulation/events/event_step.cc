@@ -697,9 +697,9 @@ EventStepper::Tried EventStepper::TryMotion(const Model<double>& model, double n
   return Tried::kAgain;
 }
 
-StepReport EventStepper::Advance(const Model<double>& model, double t, double h, AtEvent at_event,
-                                 State<double>* state) {
-  StepReport outcome;
+// Forgets what belongs to the step before.
+void EventStepper::BeginStep(const Model<double>& model, double t, double h,
+                             const State<double>& state) {
   record_.Clear();
   guess_.located = 0;
   released_.clear();
@@ -712,8 +712,14 @@ StepReport EventStepper::Advance(const Model<double>& model, double t, double h,
   shortened_.Clear();
   last_rebounds_.Clear();
   turned_at_ = -HUGE_VAL;
-  search_.StartStep(model, t, h, *state);
+  search_.StartStep(model, t, h, state);
   supports_.StartStep(*model.structure, t);
+}
+
+StepReport EventStepper::Advance(const Model<double>& model, double t, double h, AtEvent at_event,
+                                 State<double>* state) {
+  StepReport outcome;
+  BeginStep(model, t, h, *state);
   AddEdgesAtStart(model, t, *state, &outcome);
   SetReleased(model, JustAfter(model, t), state);
   const std::vector<Edge> edges = EdgesWithin(model, t, t + h);

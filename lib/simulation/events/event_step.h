@@ -157,6 +157,7 @@ class EventStepper {
   /// impulses, these come first.
   bool TurnJoints(const Model<double>& model, double now, State<double>* state,
                   StepReport* outcome);
+  void BeginStep(const Model<double>& model, double t, double h, const State<double>& state);
   Segment& BeginSegment(double now, double until, const State<double>& state);
   /// What has been tried to go on in a step. Where contacts nearly jam accelerations change so fast
   /// with poses that only a short motion can be integrated: it is halved.
