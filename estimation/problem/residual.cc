@@ -266,8 +266,9 @@ void RolloutResiduals::NameSamplesOnImpacts(Certificate* certificate) const {
       std::ostringstream what;
       what << "an observation of " << model.structure->bodies[sample.body].name << " at "
            << sample.time << " s falls on an impact";
-      std::string& reason = plan_.width() > 3 ? certificate->discontinuous : certificate->one_sided;
-      if (reason.empty()) reason = what.str();
+      const bool jumps = plan_.width() > 3;
+      std::string& reason = jumps ? certificate->discontinuous : certificate->one_sided;
+      if (jumps || reason.empty()) reason = what.str();
       SetVerdict(*certificate);
       return;
     }
