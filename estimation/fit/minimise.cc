@@ -247,20 +247,23 @@ class Minimiser : public ceres::IterationCallback {
       return ceres::SOLVER_ABORT;
     }
     if (accepted) last_good_ = q_;
-    if (accepted && CountPushes()) {
-      return ceres::SOLVER_TERMINATE_SUCCESSFULLY;
-    }
+    if (accepted && CountPushes()) return End("steps go on leaving the range of a parameter");
     if (accepted && HasNoProgress()) {
       return ceres::SOLVER_ABORT;
     }
-    if (accepted ? SlowTail() : summary.step_is_valid && WhatIsLeft().empty()) {
-      return ceres::SOLVER_TERMINATE_SUCCESSFULLY;
+    if (accepted && SlowTail()) return End("the last steps gained ever less");
+    if (!accepted && summary.step_is_valid && WhatIsLeft().empty()) {
+      return End("no step is left that matters");
     }
-    return summary.cost < ExactCost() ? ceres::SOLVER_TERMINATE_SUCCESSFULLY
-                                      : ceres::SOLVER_CONTINUE;
+    return summary.cost < ExactCost() ? End("residuals are rounding") : ceres::SOLVER_CONTINUE;
   }
 
  private:
+  ceres::CallbackReturnType End(const char* reason) {
+    minimum_.message = reason;
+    return ceres::SOLVER_TERMINATE_SUCCESSFULLY;
+  }
+
   double ExactCost() const {
     return 0.5 * kExactFit * kExactFit * static_cast<double>(layout_.num_rows());
   }
@@ -566,7 +569,7 @@ class Minimiser : public ceres::IterationCallback {
       solver.initial_trust_region_radius =
           kSmallerRegion * std::min(level_radius_, solver.initial_trust_region_radius);
     }
-    minimum_.message = summary.message;
+    if (summary.termination_type != ceres::USER_SUCCESS) minimum_.message = summary.message;
     if (gave_up_) {
       minimum_.message = "no progress in the first iterations";
     } else if (summary.termination_type == ceres::NO_CONVERGENCE) {
@@ -683,6 +686,7 @@ class Minimiser : public ceres::IterationCallback {
       if (size > 0.0) directions.push_back(unit / size * direction);
     }
     const double cost = shared_.model().cost;
+    std::string no_run;
     for (const Eigen::VectorXd& direction : directions) {
       for (const double part : {-kKinkSteps[0], kKinkSteps[0], -kKinkSteps[1], kKinkSteps[1]}) {
         const Eigen::VectorXd q =
@@ -690,15 +694,15 @@ class Minimiser : public ceres::IterationCallback {
         Eigen::VectorXd blocks;
         double target = 0.0;
         const bool done = linearizer_.Cost(q, shared_.huber(), &blocks, &target);
-        if (done && q != q_ && target < cost - kKinkGain * unit * unit) {
-          return false;
-        }
+        if (done && q != q_ && target < cost - kKinkGain * unit * unit) return false;
+        if (!done && no_run.empty()) no_run = linearizer_.message();
       }
     }
     minimum_.status = FitStatus::kConverged;
     // A cost with kinks may fall between directions that each rise.
     minimum_.message =
-        num_free == 1.0
+        !no_run.empty() ? "the cost rises, or there is no run: " + no_run
+        : num_free == 1.0
             ? "a minimum at a kink: the cost rises both ways, and its derivative jumps"
             : "at a kink: the cost rises both ways along each parameter, and its derivative jumps";
     return true;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 #include <utility>
+#include <vector>
 
 #include "tangible/estimation/fit/linearisation.h"
 #include "tangible/estimation/fit/minimise.h"
@@ -25,6 +26,8 @@ constexpr int kFlatSteps = 6;
 // Steps at most on one side: the last is 1e12 deviations off.
 constexpr int kMostSteps = 60;
 constexpr int kMostBisections = 14;
+// Points whose other values are tried at one that is not within the interval.
+constexpr size_t kMostOthers = 4;
 // Profiles that are made without being asked for, of fits with at most so many recordings.
 constexpr size_t kMostProfiles = 4;
 constexpr int kMostBlocks = 30;
@@ -113,12 +116,45 @@ class Profiler {
       if (minimum.status != FitStatus::kFailed) {
         point = {minimum.cost, held.All(minimum.parameters)};
       }
+      if (!Accepted(point)) TryOthers(&held, &point);
     }
     if (point.cost < lowest_ - rounding_ && (better_.size() == 0 || point.cost < better_cost_)) {
       better_ = point.all;
       better_cost_ = point.cost;
     }
     return points_[q] = std::move(point);
+  }
+
+  /// Where the cost has jumps, as by fixed steps through impacts, a minimisation from the nearest
+  /// values may stop at one: those of other values, the lowest first, may be better already.
+  void TryOthers(ProblemWithHeld* held, Point* point) {
+    std::vector<const Point*> others;
+    for (const auto& [at, other] : points_) {
+      if (other.all.size() > 0) others.push_back(&other);
+    }
+    std::sort(others.begin(), others.end(),
+              [](const Point* x, const Point* y) { return x->cost < y->cost; });
+    if (others.size() > kMostOthers) others.resize(kMostOthers);
+    Linearizer linearizer(held, options_.derivatives, options_.threads, nullptr);
+    Eigen::VectorXd blocks, best;
+    for (const Point* other : others) {
+      const Eigen::VectorXd start = held->Left(other->all);
+      double cost = 0.0;
+      const Eigen::VectorXd q = ToInternal(held->entries(), start);
+      if (linearizer.Cost(q, {options_.huber, options_.huber}, &blocks, &cost) &&
+          cost < point->cost - rounding_) {
+        *point = {cost, held->All(start)};
+        best = start;
+      }
+    }
+    rollouts_ += linearizer.rollouts();
+    if (best.size() == 0) return;
+    const Minimum minimum = Minimise(
+        options_, best, [] { return 0.0; }, {}, held);
+    rollouts_ += minimum.rollouts;
+    if (minimum.status != FitStatus::kFailed && minimum.cost < point->cost) {
+      *point = {minimum.cost, held->All(minimum.parameters)};
+    }
   }
 
   /// The values on one side of the estimate.

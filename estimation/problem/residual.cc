@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <sstream>
 #include <utility>
 
@@ -218,6 +219,8 @@ void RolloutResiduals::AddRadii(const Eigen::VectorXd& p, Certificate* certifica
   ChoiceList own;
   if (!ChoicesOf(scene_.model(), nullptr, scene_.initial_state(), &own)) return;
   Certificate found;
+  // A delay or clock that moves the steps makes a structure anew, in which contacts are the same.
+  const std::shared_ptr<const ModelStructure> structure = scene_.model().structure;
   for (size_t i = 0; i < entries.size(); ++i) {
     const ParameterEntry& entry = entries[i];
     const double value = p[static_cast<Eigen::Index>(i)];
@@ -228,8 +231,8 @@ void RolloutResiduals::AddRadii(const Eigen::VectorXd& p, Certificate* certifica
       return at >= entry.lower && at <= entry.upper && SetParameters(moved) &&
              ChoicesOf(scene_.model(), nullptr, scene_.initial_state(), choices);
     };
-    ValidityRadius radius = ValidityRadiusOf(*scene_.model().structure, own, beside,
-                                             std::max(std::abs(value), entry.scale));
+    ValidityRadius radius =
+        ValidityRadiusOf(*structure, own, beside, std::max(std::abs(value), entry.scale));
     radius.parameter = entry.name;
     const auto clip = [&](double sign, double* distance, std::string* where) {
       Eigen::VectorXd moved = p;

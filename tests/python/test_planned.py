@@ -49,6 +49,7 @@ def test_mistakes_of_plans_are_said() -> None:
         ({"controls": {PUSH: np.ones(3)}}, r"expected shape \(60,\), got \(3,\)"),
         ({"controls": {PUSH: np.ones((2, 60))}}, "expected one run, got a batch of 2"),
         ({"controls": {"bodies/ball/mass": 1.0}}, "expected forces/NAME/force/x"),
+        ({"controls": {PUSH: 1.0}, "parameters": {PUSH: 2.0}}, "in parameters or in controls, got both"),
         ({"initial_state": [1.0, 2.0]}, r"initial_state: expected shape \(6,\), got \(2,\)"),
         ({"initial_state": {"x": 1.0}}, "expected one of ball/x"),
         ({"initial_state": {"ball/x": np.nan}}, "initial_state ball/x: expected a finite number, got NaN"),

@@ -328,6 +328,11 @@ void ContactSearch::FindContacts(const Model<double>& model, const State<double>
       }
       if (PassesCorner(model, state, contact, approach, h)) continue;
     }
+    if (Rebounds(model, state, h, contact, rows)) {
+      contact.law = ContactLaw::kRestitution;
+      contacts->push_back(contact);
+      continue;
+    }
     // A pusher that arrives as the step ends would move a body on its support by rounding, in a
     // direction that friction cannot have.
     const double touch = lengths_.Touch(state, a, b);
@@ -335,7 +340,6 @@ void ContactSearch::FindContacts(const Model<double>& model, const State<double>
         std::abs(gap + h * approach) <= touch) {
       continue;
     }
-    if (Rebounds(model, state, h, contact, rows)) contact.law = ContactLaw::kRestitution;
     contacts->push_back(contact);
   }
   if (count < 2 && model.seams != nullptr && HaveCorners(*model.structure, contact)) {

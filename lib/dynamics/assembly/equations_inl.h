@@ -363,10 +363,11 @@ class Equations {
     const T* twist = TwistOf(support, at, point, buffer);
     const Vector2<T> velocity(twist[0] - twist[2] * arm.y(), twist[1] + twist[2] * arm.x());
     const T square = velocity.squaredNorm();
-    if (at.secant > 0.0) {
+    const bool is_sought = kLevel == Level::kVelocity || (at.is_sought && at.IsSlow(point));
+    if (at.secant > 0.0 && is_sought) {
       const T damping = limit / sqrt(T(square + at.secant * at.secant));
-      DampenSupport(support.body, PointRow(Vector2<T>(T(1.0), T(0.0)), arm), damping);
-      DampenSupport(support.body, PointRow(Vector2<T>(T(0.0), T(1.0)), arm), damping);
+      DampenPoint(support, point, at, Vector2<T>(T(1.0), T(0.0)), arm, damping);
+      DampenPoint(support, point, at, Vector2<T>(T(0.0), T(1.0)), arm, damping);
       return;
     }
     if (!(ValueOf(square) > 0.0)) return;
@@ -374,9 +375,22 @@ class Equations {
     const Vector2<T> along = velocity / speed;
     const RowPart<T> none{T(0.0), T(0.0), T(0.0)};
     b_.Push(support.body, PointRow(along, arm), s_.world(), none, T(-limit));
-    const RowPart<T> across = PointRow(Vector2<T>(-along.y(), along.x()), arm);
-    if (kLevel == Level::kVelocity || at.is_sought) {
-      DampenSupport(support.body, across, T(limit / speed));
+    if (is_sought) {
+      DampenPoint(support, point, at, Vector2<T>(-along.y(), along.x()), arm, T(limit / speed));
+    }
+  }
+
+  // A point that starts on a body that turns about it has its own acceleration, a + α × r − ω² r.
+  void DampenPoint(const SupportIndex& support, int point, const SupportState& at,
+                   const Vector2<T>& along, const Vector2<T>& arm, const T& damping) {
+    const RowPart<T> row = PointRow(along, arm);
+    DampenSupport(support.body, row, damping);
+    if constexpr (kLevel == Level::kAcceleration) {
+      if (at.slow != point) return;
+      T buffer[3];
+      const T turn = b_.TwistOf(support.body, buffer)[2];
+      const RowPart<T> none{T(0.0), T(0.0), T(0.0)};
+      b_.Push(support.body, row, s_.world(), none, T(damping * turn * turn * along.dot(arm)));
     }
   }
 

@@ -101,6 +101,12 @@ void SupportFriction::Set(const Model<double>& model, const State<double>& state
   }
 }
 
+void SupportFriction::KeepPoint(int point) {
+  points_ = {points_[static_cast<size_t>(point)]};
+  limit_ = points_[0].limit;
+  arm_ = std::hypot(points_[0].arm[0], points_[0].arm[1]);
+}
+
 void SupportFriction::At(const double twist[3], double wrench[3]) const {
   if (is_disc()) {
     DiscFriction(radius_, twist, wrench);

@@ -95,6 +95,8 @@ class SupportFriction {
   /// `state`.
   void Set(const Model<double>& model, const State<double>& state, const SupportIndex& support,
            double weight);
+  /// Leaves out all but one point.
+  void KeepPoint(int point);
 
   const std::vector<SupportPoint>& points() const { return points_; }
   bool is_disc() const { return radius_ > 0.0; }

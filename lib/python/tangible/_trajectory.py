@@ -409,6 +409,11 @@ def simulate(
     read = Scene.of(scene)
     if parameters is not None:
         mapping(parameters, "parameters", "a dict {path: value}")
+        for path in parameters:
+            if path in (controls or {}):
+                raise ValueError(
+                    f"{path}: expected a value in parameters or in controls, got both"
+                )
         read = read.with_parameters(parameters) if parameters else read
     state: Floats | None = None
     values: Floats | None = None

@@ -18,6 +18,7 @@
 #include "tangible/simulation/derivatives/rollout_directional.h"
 #include "tangible/simulation/derivatives/tolerances.h"
 #include "tangible/simulation/events/event_edges.h"
+#include "tangible/simulation/events/load_speed.h"
 #include "tangible/simulation/events/servo_bounds.h"
 #include "tangible/simulation/events/tolerances.h"
 
@@ -37,21 +38,6 @@ double ApproachOf(const StepRecord& impact, size_t first, size_t last) {
                                                  contact.b, block.normal_b));
   }
   return approach;
-}
-
-constexpr char kIsRead[] = " s is where a state is read";
-
-std::string WhereItSteps(const std::string& which, const std::string& other) {
-  return which + " s is where " + other + " steps";
-}
-
-// What else than `own` jumps at a time, to `near`; empty: nothing does.
-std::string OtherJump(const Model<double>& model, double time, double near,
-                      const std::string& own) {
-  for (const LoadJump& jump : LoadJumpsWithin(model, time - near, time + near)) {
-    if (jump.what != own) return jump.what;
-  }
-  return "";
 }
 
 }  // namespace
@@ -361,6 +347,12 @@ void RolloutCertifier::AddDiscreteMap(const Model<double>& model, long step,
   if (certificate_.discrete_map.empty()) {
     certificate_.discrete_map = EdgeThatLetsGo(model, step, record);
   }
+  held_last_.clear();
+  for (size_t i = 0; i < record.contacts.size(); ++i) {
+    if (record.solution.modes[i] == ContactMode::kSticking) {
+      held_last_.push_back(record.contacts[i]);
+    }
+  }
 }
 
 std::string RolloutCertifier::EdgeThatLetsGo(const Model<double>& model, long step,
@@ -372,7 +364,7 @@ std::string RolloutCertifier::EdgeThatLetsGo(const Model<double>& model, long st
   const auto check = [&](const ForceIndex& force, int number, const char* which) {
     if (!Wanted(number)) return;
     const double time = model.parameters[number];
-    if (time > record.time + near && time < record.time + record.h - near) {
+    if (time >= record.time - near && time <= record.time + record.h + near) {
       edge = std::string(which) + " of force " + force.name;
       held_edge_ = edge;
     }
@@ -380,6 +372,17 @@ std::string RolloutCertifier::EdgeThatLetsGo(const Model<double>& model, long st
   for (const ForceIndex& force : s.forces) {
     check(force, force.start, "start");
     check(force, force.end, "end");
+  }
+  for (const PathIndex& index : s.paths) {
+    if (!Wanted(index.numbers + kPathDelay)) continue;
+    const std::vector<double>& times = index.path->times();
+    const double delay = model.parameters[index.numbers + kPathDelay];
+    const auto first = std::lower_bound(times.begin(), times.end(), record.time - near - delay);
+    for (auto at = first; at != times.end() && *at + delay <= record.time + record.h + near; ++at) {
+      if (!index.path->JumpsAt(static_cast<int>(at - times.begin()))) continue;
+      edge = "jump of the path of " + s.bodies[index.body].name;
+      held_edge_ = edge;
+    }
   }
   if (edge.empty()) return "";
   State<double> after = record.before;
@@ -389,12 +392,19 @@ std::string RolloutCertifier::EdgeThatLetsGo(const Model<double>& model, long st
   };
   bool lets_go = false;
   for (size_t i = 0; i < record.contacts.size(); ++i) {
-    if (!record.problem.contacts[i].has_friction || record.contacts[i].is_rolling ||
-        SlidingSign(record.solution.modes[i]) == 0.0) {
+    const ActiveContact& contact = record.contacts[i];
+    if (!record.problem.contacts[i].has_friction || SlidingSign(record.solution.modes[i]) == 0.0) {
       continue;
     }
-    lets_go = lets_go || starts(SpeedsOf(model, record.before, record.contacts[i]).slip,
-                                SpeedsOf(model, after, record.contacts[i]).slip);
+    const auto slip = [&](const State<double>& state) {
+      return contact.is_rolling ? state.twist[3 * static_cast<size_t>(contact.a) + 2] -
+                                      state.twist[3 * static_cast<size_t>(contact.b) + 2]
+                                : SpeedsOf(model, state, contact).slip;
+    };
+    // A driven body has its new speed before the friction at it has let go.
+    const bool goes = std::abs(slip(after)) > kNoApproach * LoadAcceleration(record.problem);
+    lets_go =
+        lets_go || (goes && (starts(slip(record.before), slip(after)) || Has(held_last_, contact)));
   }
   for (const SupportIndex& support : s.supports) {
     const auto largest = [&](const std::vector<double>& twist) {
@@ -458,155 +468,6 @@ void RolloutCertifier::AddStep(const Model<double>& model, long step, Stepper* s
   AddLinearSystem(model, record, &stepper->system());
   AddFeatures(model, record, step, &stepper->system());
   last_.Keep(model, record);
-}
-
-void RolloutCertifier::AddForceWindows(const Model<double>& model) {
-  const SimulationSettings& settings = model.structure->settings;
-  const auto same = [&](double x, double y) {
-    return std::abs(x - y) <=
-           kSameInstant * settings.dt + kCoordinateRounding * std::max(std::abs(x), std::abs(y));
-  };
-  for (const ForceIndex& force : model.structure->forces) {
-    const auto check = [&](int number, const char* edge) {
-      if (!Wanted(number)) {
-        return;
-      }
-      const double time = model.parameters[number];
-      const std::string which =
-          std::string(edge) + " of force " + force.name + " at " + Short(time);
-      // Before the start of a run, and after its end, there is no motion that the edge changes.
-      if (same(time, 0.0) || same(time, settings.duration)) {
-        OneSided(which +
-                 (same(time, 0.0) ? " s is the start of the run" : " s is the end of the run"));
-        return;
-      }
-      if (IsReadAt(*model.structure, time)) OneSided(which + kIsRead);
-      const double near =
-          kSameInstant * settings.dt + kCoordinateRounding * std::abs(settings.duration);
-      if (OwnSignalSteps(*model.structure, force, time - near, time + near)) {
-        OneSided(which + " s is where its own signal steps");
-      }
-      // By events both sides agree; the places that fixed steps reach differ by a step's length.
-      const double k =
-          std::clamp(std::round(time / settings.dt), 0.0, static_cast<double>(NumSteps(settings)));
-      if (settings.stepping == Stepping::kFixed &&
-          same(time, StepTime(settings, static_cast<long>(k)))) {
-        OneSided(which + " s is on a step's boundary");
-      }
-    };
-    check(force.start, "start");
-    check(force.end, "end");
-    if (force.start >= 0 && force.end >= 0 && (Wanted(force.start) || Wanted(force.end)) &&
-        same(model.parameters[force.start], model.parameters[force.end])) {
-      OneSided("the window of force " + force.name + " is empty");
-    }
-  }
-}
-
-// Ends of joints as parameters. A fixed step has a joint or has it not, so that the derivative is
-// that of the discrete map, and where a step begins at the joint's end the map jumps.
-void RolloutCertifier::AddReleases(const Model<double>& model) {
-  const SimulationSettings& settings = model.structure->settings;
-  const double near =
-      kSameInstant * settings.dt + kCoordinateRounding * std::abs(settings.duration);
-  for (const JointIndex& joint : model.structure->joints) {
-    if (joint.until < 0 || !Wanted(joint.until)) continue;
-    const double time = model.parameters[joint.until];
-    const std::string which = "end of joint " + joint.name + " at " + Short(time);
-    if (settings.stepping == Stepping::kFixed) {
-      const bool acts = time > 0.0 && time < settings.duration;
-      if (acts && certificate_.discrete_map.empty()) certificate_.discrete_map = which + " s";
-      if (acts && certificate_.discrete_impact.empty()) {
-        certificate_.discrete_impact = which + " s";
-      }
-      const double k =
-          std::clamp(std::round(time / settings.dt), 0.0, static_cast<double>(NumSteps(settings)));
-      if (landing_.empty() && std::abs(time - StepTime(settings, static_cast<long>(k))) <= near) {
-        landing_ = which + " s is on a step's boundary";
-      }
-    } else if (std::abs(time) <= near) {
-      OneSided(which + " s is the start of the run");
-    } else if (std::abs(time - settings.duration) <= near) {
-      OneSided(which + " s is the end of the run");
-    } else if (IsReadAt(*model.structure, time)) {
-      OneSided(which + kIsRead);
-    } else if (const std::string other = OtherJump(model, time, near, "joint " + joint.name);
-               !other.empty()) {
-      OneSided(WhereItSteps(which, other));
-    }
-  }
-}
-
-bool RolloutCertifier::IsRead(const ModelStructure& structure, long steps) const {
-  return steps == NumSteps(structure.settings) ||
-         std::any_of(options_.reads.begin(), options_.reads.end(),
-                     [&](const StateRead& read) { return read.steps == steps; });
-}
-
-bool RolloutCertifier::IsReadAt(const ModelStructure& structure, double time) const {
-  return std::any_of(options_.reads.begin(), options_.reads.end(), [&](const StateRead& read) {
-    return IsSameInstant(structure, time, StepTime(structure.settings, read.steps));
-  });
-}
-
-std::string RolloutCertifier::AsRead(const ModelStructure& structure, long steps,
-                                     const char* event) const {
-  const bool ends = steps == NumSteps(structure.settings);
-  return std::string(ends ? "the run ends as " : "a state is read as ") + event;
-}
-
-bool RolloutCertifier::MovesRead(const ModelStructure& structure, long steps,
-                                 const ActiveContact& contact) const {
-  if (steps == NumSteps(structure.settings)) return true;
-  const ActiveContact whole = island_ != nullptr ? island_->InWhole(contact) : contact;
-  const auto is_joined = [&](int body) {
-    return std::any_of(structure.joints.begin(), structure.joints.end(),
-                       [&](const JointIndex& joint) { return joint.a == body || joint.b == body; });
-  };
-  return std::any_of(options_.reads.begin(), options_.reads.end(), [&](const StateRead& read) {
-    return read.steps == steps && (read.body < 0 || read.body == whole.a || read.body == whole.b ||
-                                   is_joined(contact.a) || is_joined(contact.b));
-  });
-}
-
-// Whether a body has a joint or spring, or touches another one as the run starts.
-bool RolloutCertifier::ActsAtStart(const ModelStructure& s, int body) const {
-  const auto has = [body](const auto& one) { return one.a == body || one.b == body; };
-  return std::any_of(s.joints.begin(), s.joints.end(), has) ||
-         std::any_of(s.springs.begin(), s.springs.end(), has) ||
-         std::any_of(touching_at_start_.begin(), touching_at_start_.end(), has);
-}
-
-// Jumps of a path's rate at which the derivative by its delay has two sides.
-void RolloutCertifier::AddPaths(const Model<double>& model) {
-  const ModelStructure& s = *model.structure;
-  for (const PathIndex& index : s.paths) {
-    if (!Wanted(index.numbers + kPathDelay)) continue;
-    const std::vector<double>& times = index.path->times();
-    for (size_t k = 0; k < times.size(); ++k) {
-      const double time = times[k] + model.parameters[index.numbers + kPathDelay];
-      if (!index.path->JumpsAt(static_cast<int>(k)) || time < -s.settings.dt) continue;
-      const std::string which =
-          "jump of the path of " + s.bodies[index.body].name + " at " + Short(time);
-      const double steps = std::round(time / s.settings.dt);
-      const long step =
-          static_cast<long>(std::clamp(steps, 0.0, static_cast<double>(NumSteps(s.settings))));
-      if (IsSameInstant(s, time, 0.0)) {
-        if (ActsAtStart(s, index.body)) OneSided(which + " s is the start of the run");
-      } else if (IsSameInstant(s, time, s.settings.duration)) {
-        OneSided(which + " s is the end of the run");
-      } else if (IsReadAt(s, time)) {
-        OneSided(which + kIsRead);
-      } else if (s.settings.stepping == Stepping::kFixed &&
-                 IsSameInstant(s, time, StepTime(s.settings, step))) {
-        OneSided(which + " s is on a step's boundary");
-      } else if (s.settings.stepping == Stepping::kEvent) {
-        const std::string other = OtherJump(model, time, kSameInstant * s.settings.dt,
-                                            "the speed of body " + s.bodies[index.body].name);
-        if (!other.empty()) OneSided(WhereItSteps(which, other));
-      }
-    }
-  }
 }
 
 Certificate RolloutCertifier::Finish(const Model<double>& model, const RolloutReport& report) {

@@ -37,6 +37,7 @@
 //   linear systems redundant rows, condition, residual (contact_conditioning.h), of every step
 
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -74,7 +75,7 @@ struct FeatureTie {
 /// Collects the certificate step by step.
 class RolloutCertifier {
  public:
-  explicit RolloutCertifier(CertifyOptions options = {}) : options_(std::move(options)) {}
+  explicit RolloutCertifier(CertifyOptions options = {});
 
   /// The step that the stepper has just done; `step` counts from 0.
   void AddStep(const Model<double>& model, long step, Stepper* stepper);
@@ -141,6 +142,8 @@ class RolloutCertifier {
                   Segment* segment);
   void AddFriction(const CoefficientSource& friction, const Place& place);
   void AddEnd(const Model<double>& model, long step, const EventRecord& record);
+  /// The reads after so many steps.
+  std::span<const StateRead> ReadsAfter(long steps) const;
   /// Whether the state after so many steps is an output; `time`: at that instant.
   bool IsRead(const ModelStructure& structure, long steps) const;
   bool IsReadAt(const ModelStructure& structure, double time) const;
@@ -202,6 +205,7 @@ class RolloutCertifier {
   InnerImpulses inner_impulses_;
   std::optional<CoordinateWatch> coordinates_;    ///< from the first step on
   std::optional<DiscreteMapWatch> discrete_map_;  ///< from the first fixed step on
+  std::vector<ActiveContact> held_last_;  ///< by friction, in the last step
   std::string made_last_;  ///< of the last step; empty if no contact was made in it
   double step_margin_ = std::numeric_limits<double>::infinity();
   double margin_beside_ = std::numeric_limits<double>::infinity();  ///< without contacts at a kink

@@ -321,7 +321,10 @@ bool RolloutCertifier::SlidesAtLimit(const Model<double>& model, ContactMode by_
   if (KeepsSide(model, slides, derivative, segment)) return false;
   const double slip =
       std::max(SlipOf(model, segment->before, slides), SlipOf(model, segment->after, slides));
-  return slip <= Negligible(model, slip) && !StartsToSlide(model, *segment, contact);
+  // A speed that an event leaves is the rounding of what the loads have done.
+  const double rounding =
+      kNoApproach * model.structure->settings.dt * LoadAcceleration(segment->stages[0].problem);
+  return slip <= Negligible(model, slip) + rounding && !StartsToSlide(model, *segment, contact);
 }
 
 // What an impact stops dead, and the loads move on at once: a little slower or faster after the

@@ -127,6 +127,11 @@ bool EventStepper::AddInstant(const Model<double>& model, double t, EventKind ki
     outcome->message.clear();
     return true;  // no conclusion without accelerations
   }
+  // What has just come to rest on its support has accelerations only once it has stopped.
+  if (supports_.HasToStop(model, segment)) {
+    return StopSupports(model, segment, parts, state, outcome) &&
+           AddInstant(model, t, kind, contact, state, outcome);
+  }
   segment.event = kind;
   segment.event_index = -1;
   if (contact != nullptr) {

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "tangible/dynamics/elements/servo.h"
+#include "tangible/dynamics/jacobian/contact_gradient.h"
 #include "tangible/dynamics/model/driven_bodies.h"
 #include "tangible/simulation/events/implicit_stage.h"
 #include "tangible/simulation/events/mode_elimination_inl.h"

@@ -24,28 +24,60 @@ void LinearisedFriction(const double about[2], const double velocity[2], double 
 }  // namespace
 
 void SupportIteration::Start(const Model<double>& model, double h,
-                             const ContactProblem<double>& problem,
-                             const std::vector<char>& are_at_rest, State<double>* before) {
+                             const ContactProblem<double>& problem, const std::vector<int>& sought,
+                             State<double>* before) {
   const ModelStructure& s = *model.structure;
   h_ = h;
   iterations_ = 0;
   residual_ = before_dampers_ = HUGE_VAL;
   is_about_ = has_held_standing_ = false;
+  times_released_ = 0;
   newton_left_ = kNewton;
   dampers_left_ = 0;
   dampers_ = kDampers;
   before->supports.resize(s.supports.size());
   residuals_.resize(s.supports.size());
   turns_.assign(s.supports.size(), 0);
-  has_share_.assign(s.supports.size(), 0);
+  shares_.assign(s.supports.size(), SupportState::kNothing);
   damped_.resize(s.supports.size());
-  at_rest_ = are_at_rest;
+  sought_ = sought;
   for (size_t k = 0; k < s.supports.size(); ++k) {
-    if (!at_rest_.empty() && at_rest_[k] == 0) continue;
+    if (PartOf(k) == SupportState::kNothing) continue;
     const size_t row = 3 * static_cast<size_t>(s.bodies[s.supports[k].body].block);
-    friction_.Set(model, *before, s.supports[k], h);
-    before->supports[k] = friction_.SolveAlone(&problem.mass[row], &problem.load[row]);
+    double shift[2];
+    Set(model, *before, k, shift);
+    double momentum[3];
+    std::copy_n(&problem.load[row], 3, momentum);
+    for (int i = 0; i < 2; ++i) momentum[i] += problem.mass[row + i] * shift[i];
+    before->supports[k] = OfBody(k, friction_.SolveAlone(&problem.mass[row], momentum));
   }
+}
+
+void SupportIteration::Set(const Model<double>& model, const State<double>& before, size_t k,
+                           double shift[2]) {
+  const SupportIndex& support = model.structure->supports[k];
+  friction_.Set(model, before, support, h_);
+  shift[0] = shift[1] = 0.0;
+  const int part = PartOf(k);
+  if (part < 0) return;
+  friction_.KeepPoint(part);
+  const double turn = before.twist[3 * static_cast<size_t>(support.body) + 2];
+  for (int i = 0; i < 2; ++i) shift[i] = -turn * turn * friction_.points()[0].arm[i];
+}
+
+SupportState SupportIteration::OfPart(size_t k, const SupportState& at) const {
+  SupportState part = at;
+  if (PartOf(k) >= 0) part.holds = at.holds == PartOf(k) ? 0 : SupportState::kNothing;
+  return part;
+}
+
+SupportState SupportIteration::OfBody(size_t k, const SupportState& at) const {
+  SupportState whole = at;
+  if (PartOf(k) < 0) return whole;
+  whole.holds = at.holds == SupportState::kNothing ? at.holds : PartOf(k);
+  whole.slow = PartOf(k);
+  whole.is_sought = true;
+  return whole;
 }
 
 // The impulse that the linearised support gives its body in a solve; `held`: of its rows.
@@ -162,7 +194,7 @@ double SupportIteration::AwayFrom(const SupportState& at, const double mass[3],
 }
 
 void SupportIteration::Linearise(const double mass[3], const double twist[3], const double* held,
-                                 int* turns, SupportState* at) const {
+                                 bool has_share, int* turns, SupportState* at) const {
   // Held as a whole after so many turns, and again after as many.
   constexpr int kHeldAfter = 3;
   double impulse[3], momentum[3];
@@ -174,7 +206,7 @@ void SupportIteration::Linearise(const double mass[3], const double twist[3], co
     return;
   }
   const SupportState alone = friction_.SolveAlone(mass, momentum);
-  bool turns_round = alone.holds != at->holds;
+  bool turns_round = !has_share && alone.holds != at->holds;
   if (friction_.is_disc()) {
     const double* u = at->twist.data();
     turns_round =
@@ -194,7 +226,19 @@ void SupportIteration::Linearise(const double mass[3], const double twist[3], co
   } else if (turns_round) {
     *at = alone;
   } else {
-    std::copy_n(twist, 3, at->twist.begin());
+    MoveAbout(mass, twist, at);
+  }
+}
+
+void SupportIteration::MoveAbout(const double mass[3], const double twist[3],
+                                 SupportState* at) const {
+  std::copy_n(twist, 3, at->twist.begin());
+  if (friction_.is_disc() || friction_.points().size() < 2) return;
+  for (size_t i = 0; i < friction_.points().size() && at->holds == SupportState::kNothing; ++i) {
+    double velocity[2];
+    friction_.points()[i].VelocityAt(twist, velocity);
+    const double speed = std::hypot(velocity[0], velocity[1]);
+    if (speed <= kStandingPoint * friction_.limit() / mass[0]) at->holds = static_cast<int>(i);
   }
 }
 
@@ -210,12 +254,22 @@ void SupportIteration::KeepAtRest(const ModelStructure& structure, StepRecord* r
   }
 }
 
-bool SupportIteration::Release(State<double>* before) {
+bool SupportIteration::Release(const Model<double>& model, State<double>* before) {
+  const auto held = [&](size_t k) { return before->supports[k].holds != SupportState::kNothing; };
+  size_t weakest = before->supports.size();
+  double least = HUGE_VAL;
   bool any = false;
-  for (SupportState& at : before->supports) {
-    if (at.holds == SupportState::kNothing) continue;
-    at = SupportState();
+  for (size_t k = 0; k < before->supports.size(); ++k) {
+    if (!held(k)) continue;
+    friction_.Set(model, *before, model.structure->supports[k], h_);
+    if (friction_.limit() < least) weakest = k;
+    least = std::min(least, friction_.limit());
     any = true;
+  }
+  // What holds again without a solution presses against others that hold: the weakest gives way.
+  const bool all = times_released_++ == 0;
+  for (size_t k = 0; k < before->supports.size(); ++k) {
+    if (held(k) && (all || k == weakest)) before->supports[k] = SupportState();
   }
   ++iterations_;
   residual_ = HUGE_VAL;
@@ -224,15 +278,19 @@ bool SupportIteration::Release(State<double>* before) {
 
 template <typename Visit>
 void SupportIteration::ForEach(const Model<double>& model, const ContactProblem<double>& problem,
-                               const ContactSolution<double>& solution, const State<double>& before,
+                               const ContactSolution<double>& solution, State<double>* before,
                                const Visit& visit) {
   const ModelStructure& s = *model.structure;
   for (size_t k = 0; k < s.supports.size(); ++k) {
-    if (!at_rest_.empty() && at_rest_[k] == 0) continue;
+    if (PartOf(k) == SupportState::kNothing) continue;
     const size_t row = 3 * static_cast<size_t>(s.bodies[s.supports[k].body].block);
-    friction_.Set(model, before, s.supports[k], h_);
-    visit(k, &problem.mass[row], &solution.motion[row],
-          &solution.joint_impulse[3 * (s.joints.size() + k)]);
+    double shift[2];
+    Set(model, *before, k, shift);
+    const double twist[3] = {solution.motion[row] + shift[0], solution.motion[row + 1] + shift[1],
+                             solution.motion[row + 2]};
+    SupportState at = OfPart(k, before->supports[k]);
+    visit(k, &problem.mass[row], twist, &solution.joint_impulse[3 * (s.joints.size() + k)], &at);
+    before->supports[k] = OfBody(k, at);
   }
 }
 
@@ -249,15 +307,17 @@ void SupportIteration::GoOnWithDampers(const Model<double>& model,
     dampers_left_ = std::exchange(dampers_, 2 * dampers_);
     smoothing_ = is_first ? 1.0 : kDamperSmoothing;
   } else {
-    if (is_first) smoothing_ *= std::pow(kDamperSmoothing, 1.0 / kDampers);
+    // What a contact pushes out of a small penetration slides more slowly than what is at rest
+    // creeps at first.
+    smoothing_ *= std::pow(kDamperSmoothing, is_first ? 1.0 / kDampers : 2.0 / dampers_);
     --dampers_left_;
   }
   bool settles = true;
   size_t part = 0;
   ratios_.swap(last_ratios_);
-  ForEach(model, problem, solution, *before,
-          [&](size_t k, const double* mass, const double* twist, const double*) {
-            SupportState& at = before->supports[k];
+  ForEach(model, problem, solution, before,
+          [&](size_t k, const double* mass, const double* twist, const double*, SupportState* of) {
+            SupportState& at = *of;
             const size_t first = std::exchange(part, part + NumParts());
             if (!(friction_.limit() > 0.0)) return;
             if (ratios_.size() < part) ratios_.resize(part);
@@ -268,7 +328,7 @@ void SupportIteration::GoOnWithDampers(const Model<double>& model,
             if (!begins && dampers_left_ == 0) {
               std::copy_n(twist, 3, damped_[k].begin());
               settles = Classify(twist, &ratios_[first], &last_ratios_[first], &at) && settles;
-              has_share_[k] = at.holds != SupportState::kNothing;
+              shares_[k] = at.holds;
               return;
             }
             at = SupportState();
@@ -280,7 +340,7 @@ void SupportIteration::GoOnWithDampers(const Model<double>& model,
             at.secant = smoothing_ * friction_.limit() / mass[0];
           });
   if (dampers_left_ == 0) newton_left_ = kNewtonAfterwards;
-  if (!settles) std::fill(has_share_.begin(), has_share_.end(), 0);
+  if (!settles) std::fill(shares_.begin(), shares_.end(), SupportState::kNothing);
   ++iterations_;
   residual_ = HUGE_VAL;
 }
@@ -346,14 +406,14 @@ bool SupportIteration::HoldStanding(const Model<double>& model,
                                     State<double>* before) {
   if (std::exchange(has_held_standing_, true)) return false;
   bool any = false;
-  ForEach(model, problem, solution, *before,
-          [&](size_t k, const double* mass, const double* twist, const double*) {
-            SupportState& at = before->supports[k];
+  ForEach(model, problem, solution, before,
+          [&](size_t k, const double* mass, const double* twist, const double*, SupportState* of) {
+            SupportState& at = *of;
             if (!Stands(at, mass, twist)) return;
             const bool is_point = !friction_.is_disc() && friction_.points().size() == 1;
             at = SupportState();
             at.holds = is_point ? 0 : static_cast<int>(SupportState::kBody);
-            has_share_[k] = 1;  // that of this solve
+            shares_[k] = at.holds;  // that of this solve
             any = true;
           });
   if (!any) return false;
@@ -371,26 +431,26 @@ bool SupportIteration::Accept(const Model<double>& model, const ContactProblem<d
   }
   const double last = residual_;
   const auto visit = [&](const auto& of_support) {
-    ForEach(model, problem, solution, *before, of_support);
+    ForEach(model, problem, solution, before, of_support);
   };
   residual_ = 0.0;
   double away = 0.0;
-  visit([&](size_t k, const double* mass, const double* twist, const double* held) {
-    away = std::max(away, AwayFrom(before->supports[k], mass, twist));
-    residuals_[k] = ResidualOf(before->supports[k], has_share_[k] != 0, mass, twist, held);
-    if (residuals_[k] < residual_) return;
-    residual_ = residuals_[k];
-    worst_body_ = s.supports[k].body;
-  });
+  visit(
+      [&](size_t k, const double* mass, const double* twist, const double* held, SupportState* at) {
+        away = std::max(away, AwayFrom(*at, mass, twist));
+        residuals_[k] = ResidualOf(*at, HasShare(k, *at), mass, twist, held);
+        if (residuals_[k] < residual_) return;
+        residual_ = residuals_[k];
+        worst_body_ = s.supports[k].body;
+      });
   if (residual_ <= kSupportSettled && (away <= kSupportAbout || is_about_)) {
     return !HoldStanding(model, problem, solution, before);
   }
   if (residual_ <= kSupportSettled) {
     is_about_ = true;
     ++iterations_;
-    visit([&](size_t k, const double* mass, const double* twist, const double*) {
-      SupportState& at = before->supports[k];
-      if (AwayFrom(at, mass, twist) > kSupportAbout) std::copy_n(twist, 3, at.twist.begin());
+    visit([&](size_t, const double* mass, const double* twist, const double*, SupportState* at) {
+      if (AwayFrom(*at, mass, twist) > kSupportAbout) MoveAbout(mass, twist, at);
     });
     return false;
   }
@@ -402,10 +462,11 @@ bool SupportIteration::Accept(const Model<double>& model, const ContactProblem<d
     return false;
   }
   ++iterations_;
-  visit([&](size_t k, const double* mass, const double* twist, const double* held) {
-    if (residuals_[k] > kSupportSettled)
-      Linearise(mass, twist, held, &turns_[k], &before->supports[k]);
-  });
+  visit(
+      [&](size_t k, const double* mass, const double* twist, const double* held, SupportState* at) {
+        if (residuals_[k] > kSupportSettled)
+          Linearise(mass, twist, held, HasShare(k, *at), &turns_[k], at);
+      });
   return false;
 }
 

@@ -18,7 +18,9 @@
 // solution without leaving it again, slowly, and tell by |v⁺| / |û|, which is |f| / (μ N), what is
 // held. Newton's method goes on from there, and after that more dampers. Of bodies that are held
 // together the shares are not determined, and those of the solve may exceed what one can give where
-// others could give more: the dampers have found shares with which all are held. A body of given
+// others could give more: the dampers have found shares with which all are held. Of a body that
+// turns about a point at rest, only that point is sought: its acceleration a + α × r − ω² r is that
+// of a body with the acceleration a − ω² r, for which all of the above holds. A body of given
 // motion may push others however large their friction: where a problem has no solution with what is
 // held, all of it is let go, and û is the twist that the others then give it.
 
@@ -34,10 +36,10 @@ namespace tangible {
 class SupportIteration {
  public:
   /// Chooses what the supports do in a step of length h. `problem` has been assembled without them.
-  /// `are_at_rest`: empty, or which supports count; of accelerations (h = 1) those of bodies at
-  /// rest, whose accelerations stand for the new twists.
+  /// `sought`: empty, or which supports count, by SupportState::Holds; of accelerations (h = 1)
+  /// those of bodies at rest, or a point at rest, whose accelerations stand for the new twists.
   void Start(const Model<double>& model, double h, const ContactProblem<double>& problem,
-             const std::vector<char>& are_at_rest, State<double>* before);
+             const std::vector<int>& sought, State<double>* before);
   /// Whether the friction of a solved step is that of its new twists, to the tolerance of the LCP,
   /// and linearised about them; if it is not, linearises it anew in `before`, which is the state of
   /// the record. Where the friction keeps its direction it is right at once, but its derivative
@@ -48,8 +50,9 @@ class SupportIteration {
   /// Sets the twists of what an accepted step holds at rest to 0: the solve leaves their rounding.
   static void KeepAtRest(const ModelStructure& structure, StepRecord* record);
   /// After a solve that has no solution, as where a body of given motion pushes one that is held:
-  /// lets go all that is held, without friction in the next solve. False where nothing is held.
-  bool Release(State<double>* before);
+  /// lets go what is held, without friction in the next solve: all of it, and after that the
+  /// weakest. False where nothing is held.
+  bool Release(const Model<double>& model, State<double>* before);
 
   bool has_given_up() const { return iterations_ >= kMostIterations; }
   /// Of μ N, at the last solve without dampers.
@@ -65,8 +68,14 @@ class SupportIteration {
   /// `has_share`: what the support holds is known to be within its limit.
   double ResidualOf(const SupportState& at, bool has_share, const double mass[3],
                     const double twist[3], const double* held) const;
-  void Linearise(const double mass[3], const double twist[3], const double* held, int* turns,
-                 SupportState* at) const;
+  void Linearise(const double mass[3], const double twist[3], const double* held, bool has_share,
+                 int* turns, SupportState* at) const;
+  bool HasShare(size_t k, const SupportState& at) const {
+    return at.holds != SupportState::kNothing && at.holds == shares_[k];
+  }
+  /// Linearises about a twist. A point that it does not move, as one at a pin, is held: its damper
+  /// would have no bound.
+  void MoveAbout(const double mass[3], const double twist[3], SupportState* at) const;
   double AwayFrom(const SupportState& at, const double mass[3], const double twist[3]) const;
   size_t NumParts() const { return friction_.is_disc() ? 1 : friction_.points().size(); }
   /// |v⁺| / √(v̂² + s²) of a part of a support with dampers: of the disc, or of a point.
@@ -75,10 +84,16 @@ class SupportIteration {
   /// of the last solve and of the one before. Whether what slides does so by its own twist.
   bool Classify(const double twist[3], const double* ratios, const double* before,
                 SupportState* at) const;
+  int PartOf(size_t k) const { return sought_.empty() ? SupportState::kBody : sought_[k]; }
+  /// Takes the friction of what is sought of a support, and what turns its twist into that of
+  /// friction, m/s or m/s².
+  void Set(const Model<double>& model, const State<double>& before, size_t k, double shift[2]);
+  SupportState OfPart(size_t k, const SupportState& at) const;
+  SupportState OfBody(size_t k, const SupportState& at) const;
+  /// Visits what is sought: `at`, `twist` and `held` are of a support of that part alone.
   template <typename Visit>
   void ForEach(const Model<double>& model, const ContactProblem<double>& problem,
-               const ContactSolution<double>& solution, const State<double>& before,
-               const Visit& visit);
+               const ContactSolution<double>& solution, State<double>* before, const Visit& visit);
   /// Holds what does not move although it was not held, as where a rail takes all that pushes it:
   /// derivatives are those of a body that is held. Whether there is anything, the first time.
   bool HoldStanding(const Model<double>& model, const ContactProblem<double>& problem,
@@ -91,6 +106,7 @@ class SupportIteration {
 
   double h_ = 0.0;
   int iterations_ = 0;
+  int times_released_ = 0;
   double residual_ = 0.0;
   double before_dampers_ = HUGE_VAL;
   bool is_about_ = false;  ///< linearised once more since it settled
@@ -102,11 +118,11 @@ class SupportIteration {
   int worst_body_ = -1;
   SupportFriction friction_;
   std::vector<double> residuals_;
-  std::vector<char> at_rest_;
+  std::vector<int> sought_;
   std::vector<std::array<double, 3>> damped_;  ///< twists at the end of the last round of dampers
   std::vector<double> ratios_, last_ratios_;   ///< of the parts of all supports
-  std::vector<char> has_share_;  ///< what it holds has been found within its limit by the dampers
-  std::vector<int> turns_;       ///< how often each support has turned round in this step
+  std::vector<int> shares_;  ///< what the dampers have found held, within the limit
+  std::vector<int> turns_;   ///< how often each support has turned round in this step
 };
 
 }  // namespace tangible

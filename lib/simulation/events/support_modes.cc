@@ -67,6 +67,11 @@ double GainOfPart(const SupportFriction& friction, int part, const double twist[
   return gain;
 }
 
+// What is held of a support where all of a part of it is.
+int WholeOf(const SupportIndex& support, int part) {
+  return support.kind == SupportIndex::kCentre ? 0 : part;
+}
+
 const double* NumbersOfBlock(const Model<double>& model, int k, const std::vector<double>& values) {
   const ModelStructure& s = *model.structure;
   return &values[3 * static_cast<size_t>(s.bodies[s.supports[k].body].block)];
@@ -170,7 +175,7 @@ void SupportModes::Begin(const Model<double>& model, double slow, Segment* segme
   State<double>& before = segment->before;
   before.supports.assign(s.supports.size(), SupportState());
   courses_.assign(s.supports.size(), Course::kFree);
-  at_rest_.assign(s.supports.size(), 0);
+  sought_.assign(s.supports.size(), SupportState::kNothing);
   turns_.assign(s.supports.size(), 0);
   turned_.assign(s.supports.size(), 0);
   changes_ = 0;
@@ -181,7 +186,13 @@ void SupportModes::Begin(const Model<double>& model, double slow, Segment* segme
     friction_.Set(model, before, s.supports[k], 1.0);
     SupportState& at = before.supports[k];
     courses_[k] = CourseOf(model, k, slow, *segment, &at);
-    if (courses_[k] == Course::kRests || courses_[k] == Course::kStarts) Seek(k, &at);
+    if (courses_[k] == Course::kRests || courses_[k] == Course::kStarts) {
+      Seek(k, SupportState::kBody, &at);
+    } else if (!segment->contacts.empty() || !s.joints.empty()) {
+      // Others may share what holds its point, or start with it.
+      if (courses_[k] == Course::kTurns) Seek(k, at.holds, &at);
+      if (courses_[k] == Course::kPasses) Seek(k, at.slow, &at);
+    }
   }
 }
 
@@ -195,9 +206,16 @@ void SupportModes::GoOn(const Model<double>& model, int k, State<double>* before
   SupportState& at = before->supports[k];
   at = SupportState();
   std::copy_n(twist, 3, at.twist.begin());
-  courses_[k] = CourseOfPoints(support, kSlowSupport * unit, kStartingSupport * unit, &at);
-  at_rest_[k] = 0;
   started_ = false;
+  for (int i = 0; support.kind == SupportIndex::kPoints && i < support.num_points; ++i) {
+    if (SpeedOfPart(friction_, i, twist) <= kStandingPoint * unit) at.holds = i;
+  }
+  if (at.holds != SupportState::kNothing) {
+    courses_[k] = Course::kTurns;
+    return Seek(k, at.holds, &at);
+  }
+  courses_[k] = CourseOfPoints(support, kSlowSupport * unit, kStartingSupport * unit, &at);
+  sought_[k] = SupportState::kNothing;
 }
 
 bool SupportModes::LetGo(const Model<double>& model, State<double>* before) {
@@ -205,14 +223,14 @@ bool SupportModes::LetGo(const Model<double>& model, State<double>* before) {
   bool any = false;
   for (int k = 0; k < static_cast<int>(before->supports.size()); ++k) {
     SupportState& at = before->supports[k];
-    if (at_rest_[k] == 0 || at.holds == SupportState::kNothing) continue;
+    if (sought_[k] == SupportState::kNothing || at.holds == SupportState::kNothing) continue;
     any = true;
-    if (courses_[k] == Course::kStarts) {
+    if (HasBegun(k)) {
       GoOn(model, k, before);
       continue;
     }
     at = SupportState();
-    at.slow = SupportState::kBody;
+    at.slow = sought_[k];
     at.is_sought = true;
   }
   return any;
@@ -222,7 +240,7 @@ bool SupportModes::GoOnInstead(const Model<double>& model, State<double>* before
   bool any = false;
   if (changes_ <= kMostOfSlow) return any;
   for (int k = 0; k < static_cast<int>(before->supports.size()); ++k) {
-    if (courses_[k] != Course::kStarts) continue;
+    if (!HasBegun(k)) continue;
     GoOn(model, k, before);
     any = true;
   }
@@ -230,13 +248,18 @@ bool SupportModes::GoOnInstead(const Model<double>& model, State<double>* before
   return any;
 }
 
-// The friction of a body at rest is sought; at first it has none.
-void SupportModes::Seek(int k, SupportState* at) {
-  at_rest_[k] = 1;
+// At first it has none.
+void SupportModes::Seek(int k, int part, SupportState* at) {
+  sought_[k] = part;
   started_ = false;
   *at = SupportState();
-  at->slow = SupportState::kBody;
+  at->slow = part;
   at->is_sought = true;
+}
+
+long SupportModes::NumSought() const {
+  return std::count_if(sought_.begin(), sought_.end(),
+                       [](int part) { return part != SupportState::kNothing; });
 }
 
 bool SupportModes::Accept(const Model<double>& model, const ContactProblem<double>& problem,
@@ -245,13 +268,13 @@ bool SupportModes::Accept(const Model<double>& model, const ContactProblem<doubl
   State<double>& before = segment->before;
   ++changes_;
   bool accepted = true;
-  const auto sought = std::count(at_rest_.begin(), at_rest_.end(), 1);
+  const long sought = NumSought();
   for (int k = 0; k < static_cast<int>(s.supports.size()); ++k) {
     if (AcceptOne(model, k, solution, segment)) continue;
     accepted = false;
     unsettled_ = k;
   }
-  if (std::count(at_rest_.begin(), at_rest_.end(), 1) != sought) return false;
+  if (NumSought() != sought) return false;
   if (sought == 0) return accepted;
   bool settled = false;
   if (!std::exchange(started_, true)) {
@@ -261,35 +284,55 @@ bool SupportModes::Accept(const Model<double>& model, const ContactProblem<doubl
     for (size_t i = 0; i < pushed_.load.size(); ++i) {
       pushed_.load[i] = problem.mass[i] * solution.motion[i];
     }
-    iteration_.Start(model, 1.0, pushed_, at_rest_, &before);
+    iteration_.Start(model, 1.0, pushed_, sought_, &before);
   } else {
     settled = iteration_.Accept(model, problem, solution, &before);
   }
   const bool may_share = !segment->contacts.empty() || !s.joints.empty();
   if (settled && may_share && HoldSharing(model, solution, segment)) return false;
   for (int k = 0; k < static_cast<int>(s.supports.size()); ++k) {
-    if (at_rest_[k] == 0) continue;
+    if (sought_[k] == SupportState::kNothing) continue;
     SupportState& at = before.supports[k];
-    at.slow = SupportState::kBody;
+    at.slow = sought_[k];
     // A body that starts keeps the derivative of its direction.
     at.is_sought = true;
-    if (!settled) unsettled_ = k;
-    if (!settled || courses_[k] != Course::kStarts) continue;
-    // A body that is slow, but does not move along the acceleration that it would have at rest,
-    // comes to rest or turns.
-    const double* twist = &before.twist[3 * static_cast<size_t>(s.supports[k].body)];
-    friction_.Set(model, before, s.supports[k], 1.0);
-    const double* goes = at.twist.data();
-    const double along = ProductOf(friction_, twist, goes);
-    const double sizes =
-        std::sqrt(ProductOf(friction_, twist, twist) * ProductOf(friction_, goes, goes));
-    if (at.holds == SupportState::kNothing && along >= kStartingAlong * sizes && sizes > 0.0) {
-      continue;
+    if (sought_[k] >= 0 && at.holds != SupportState::kNothing) {
+      at.slow = SupportState::kNothing;
+      at.is_sought = false;
     }
+    if (!settled) unsettled_ = k;
+    if (!settled || !HasBegun(k)) continue;
+    // What is slow, but does not move along the acceleration that it would have at rest, comes to
+    // rest or turns.
+    friction_.Set(model, before, s.supports[k], 1.0);
+    if (sought_[k] >= 0) friction_.KeepPoint(sought_[k]);
+    if (at.holds == SupportState::kNothing && StartsAlong(model, k, before)) continue;
     GoOn(model, k, &before);
     accepted = false;
   }
   return accepted && settled;
+}
+
+// Whether a slow velocity is along the acceleration with which friction has been sought. Where
+// points start with it the direction turns from the first on, and what is across it, which friction
+// takes away at once, counts by its size.
+bool SupportModes::StartsAlong(const Model<double>& model, int k,
+                               const State<double>& before) const {
+  const SupportIndex& support = model.structure->supports[k];
+  const double* twist = &before.twist[3 * static_cast<size_t>(support.body)];
+  const double* goes = before.supports[k].twist.data();
+  const double along = ProductOf(friction_, twist, goes);
+  const double speeds = ProductOf(friction_, twist, twist);
+  const double sizes = std::sqrt(speeds * ProductOf(friction_, goes, goes));
+  if (!(sizes > 0.0)) return false;
+  const double unit =
+      friction_.limit() / model.parameters[model.structure->bodies[support.body].mass];
+  // 1 − cos is half of the square of a small angle.
+  double within = 1.0 - kStartingAlong;
+  if (std::any_of(sought_.begin(), sought_.end(), [](int part) { return part >= 0; })) {
+    within /= std::max(speeds / std::pow(kStartingSupport * unit * dt_, 2), kLeastOfStart);
+  }
+  return sizes - along <= within * sizes;
 }
 
 bool SupportModes::HoldSharing(const Model<double>& model, const ContactSolution<double>& solution,
@@ -298,24 +341,29 @@ bool SupportModes::HoldSharing(const Model<double>& model, const ContactSolution
   std::vector<int> still;
   bool any = false;
   for (int k = 0; k < static_cast<int>(s.supports.size()); ++k) {
-    if (at_rest_[k] == 0 || courses_[k] != Course::kRests) continue;
+    if (sought_[k] == SupportState::kNothing || HasBegun(k)) continue;
     friction_.Set(model, segment->before, s.supports[k], 1.0);
     const double unit = friction_.limit() / model.parameters[s.bodies[s.supports[k].body].mass];
     const double* acceleration = NumbersOfBlock(model, k, solution.motion);
-    if (!(SpeedOfPart(friction_, SupportState::kBody, acceleration) <= kStandingPoint * unit)) {
-      continue;
+    double size = SpeedOfPart(friction_, SupportState::kBody, acceleration);
+    if (sought_[k] >= 0) {
+      double of_point[2];
+      AccelerationOf(friction_.points()[static_cast<size_t>(sought_[k])], acceleration,
+                     segment->before.twist[3 * static_cast<size_t>(s.supports[k].body) + 2],
+                     of_point);
+      size = std::hypot(of_point[0], of_point[1]);
     }
+    if (!(size <= kStandingPoint * unit)) continue;
     still.push_back(k);
-    any = any || segment->before.supports[k].holds == SupportState::kNothing;
+    any = any || segment->before.supports[k].holds != WholeOf(s.supports[k], sought_[k]);
   }
   if (!any) return false;
   for (const int k : still) {
-    const bool is_centre = s.supports[k].kind == SupportIndex::kCentre;
     SupportState& at = segment->before.supports[k];
     at = SupportState();
-    at.holds = is_centre ? 0 : static_cast<int>(SupportState::kBody);
+    at.holds = WholeOf(s.supports[k], sought_[k]);
     courses_[k] = Course::kShares;
-    at_rest_[k] = 0;
+    sought_[k] = SupportState::kNothing;
   }
   started_ = false;
   return true;
@@ -358,6 +406,7 @@ bool SupportModes::AcceptOne(const Model<double>& model, int k,
   const double* acceleration = NumbersOfBlock(model, k, solution.motion);
   const double* twist = &segment->before.twist[3 * static_cast<size_t>(s.supports[k].body)];
   friction_.Set(model, segment->before, s.supports[k], 1.0);
+  if (sought_[k] != SupportState::kNothing) return true;
   if (course == Course::kTurns) {
     const int point = at.holds >= 0 ? at.holds : at.slow;
     return AcceptPoint(point, acceleration, twist[2],
@@ -369,7 +418,8 @@ bool SupportModes::AcceptOne(const Model<double>& model, int k,
     if (gain < 0.0) return true;
     // It does not slow down: it has begun to move, or only passes a low speed.
     courses_[k] = at.slow == SupportState::kBody ? Course::kStarts : Course::kPasses;
-    if (at.slow == SupportState::kBody) Seek(k, &at);
+    const bool may_share = !segment->contacts.empty() || !s.joints.empty();
+    if (at.slow == SupportState::kBody || may_share) Seek(k, at.slow, &at);
     return false;
   }
   const int point = at.slow;

@@ -92,13 +92,19 @@ class SupportModes {
   Course CourseOfPoints(const SupportIndex& support, double stops, double starts, SupportState* at);
   bool AcceptOne(const Model<double>& model, int k, const ContactSolution<double>& solution,
                  Segment* segment);
-  /// Bodies at rest whose accelerations are 0 although a support is at its limit: what others take
-  /// from it holds them all. Whether there are any.
+  /// Bodies, and points, at rest whose accelerations are 0 although a support is at its limit: what
+  /// others take from it holds them all. Whether there are any.
   bool HoldSharing(const Model<double>& model, const ContactSolution<double>& solution,
                    Segment* segment);
   bool AcceptPoint(int point, const double acceleration[3], double turn, const double* held,
                    int* changes, SupportState* at) const;
-  void Seek(int k, SupportState* at);
+  /// Seeks the friction of a support, or of a point of it that is at rest.
+  void Seek(int k, int part, SupportState* at);
+  long NumSought() const;
+  bool HasBegun(int k) const {
+    return courses_[k] == Course::kStarts || courses_[k] == Course::kPasses;
+  }
+  bool StartsAlong(const Model<double>& model, int k, const State<double>& before) const;
   void GoOn(const Model<double>& model, int k, State<double>* before);
   double LongestOf(const Model<double>& model, int k, const Segment& segment, SolvedNode* start);
   double ShareOfDecay(const Model<double>& model, int k, const Segment& segment, SolvedNode* start);
@@ -110,7 +116,7 @@ class SupportModes {
   int unsettled_ = -1;
   bool started_ = false;  ///< the iteration of bodies at rest
   std::vector<Course> courses_;
-  std::vector<char> at_rest_;
+  std::vector<int> sought_;  ///< what is sought of each support, by SupportState::Holds
   std::vector<char> turns_;  ///< the support is at rest, and the body turns about its only point
   std::vector<double> speeds_, last_speeds_;  ///< of supports, in this motion and the one before
   std::vector<int> turned_;  ///< how often the direction of a support has been changed

@@ -230,6 +230,8 @@ inline constexpr double kSlowSupport = 1e-6;
 inline constexpr double kStartingSupport = 0.05;
 /// Cosine: within this angle of its acceleration a slow body counts as starting.
 inline constexpr double kStartingAlong = 0.999999;
+/// Of the square of kStartingSupport: what is slower may be within the angle of such a speed.
+inline constexpr double kLeastOfStart = 1e-5;
 /// Of dt: the first motion of a body that its support lets go.
 inline constexpr double kFirstOfSupport = 1e-3;
 /// A motion changes the velocity of a point on a support by no more than this share; the error of a

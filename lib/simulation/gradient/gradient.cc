@@ -119,6 +119,13 @@ bool IsByEvents(const GradientProblem& problem) {
   return problem.settings().stepping == Stepping::kEvent;
 }
 
+// Whether all that makes the derivative of fixed steps one-sided is contacts at a kink.
+bool AreKinksResolved(const Certificate& certificate) {
+  const bool contradicts = certificate.one_sided == kContradictingRows;
+  return (certificate.degenerate_rows > 0 || contradicts) && certificate.discontinuous.empty() &&
+         (certificate.one_sided.empty() || contradicts);
+}
+
 bool BySide(const GradientProblem& problem, DerivativeSide side, RolloutWorker* worker,
             GradientResult* result) {
   const bool by_events = IsByEvents(problem);
@@ -128,11 +135,28 @@ bool BySide(const GradientProblem& problem, DerivativeSide side, RolloutWorker* 
   if (by_events) {
     return ByRollouts(problem, {.method = GradientMethod::kTangent}, worker, result);
   }
-  return Take(problem,
-              worker->OneSidedJacobian(problem.input, side == DerivativeSide::kPlus ? 1.0 : -1.0,
-                                       &result->jacobian),
-              result) &&
-         internal::EdgesBySides(problem, side, worker, result);
+  const bool done =
+      Take(problem,
+           worker->OneSidedJacobian(problem.input, side == DerivativeSide::kPlus ? 1.0 : -1.0,
+                                    &result->jacobian),
+           result) &&
+      internal::EdgesBySides(problem, side, worker, result);
+  // The directional derivative solves a small LCP of contacts, not what supports and servos do
+  // next, nor which corner takes over; the limits of the derivatives beside have these too.
+  const ModelStructure& structure = problem.function.structure();
+  if ((done && AreKinksResolved(result->certificate) && structure.supports.empty() &&
+       structure.servos.empty()) ||
+      IsTrustworthyMap(result->certificate)) {
+    return done;
+  }
+  GradientResult beside = *result;
+  if (!internal::JacobianBySides(problem, side, worker, &beside)) {
+    if (done && AreKinksResolved(result->certificate)) return true;
+    result->message = beside.message;
+    return false;
+  }
+  *result = std::move(beside);
+  return true;
 }
 
 bool RunMethod(const GradientProblem& problem, const GradientOptions& options,
@@ -203,10 +227,7 @@ void JudgeSide(const GradientProblem& problem, const GradientOptions& options,
   if (!result->notes.empty()) {
     return;  // of ends of force windows
   }
-  const bool resolved =
-      certificate.degenerate_rows > 0 || certificate.one_sided == kContradictingRows;
-  if (!resolved || !certificate.discontinuous.empty() ||
-      (!certificate.one_sided.empty() && certificate.one_sided != kContradictingRows)) {
+  if (!AreKinksResolved(certificate)) {
     result->notes.push_back("one-sided derivatives resolve contacts at a kink alone, not: " +
                             WithoutDiscreteMap(certificate.verdict));
   }

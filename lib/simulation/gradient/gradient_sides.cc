@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // One-sided derivatives of event stepping at a kink, and of fixed steps where a force's window ends
-// on a step's end: limits of the derivative on one side,
+// on a step's end, at kinks of supports and servos, and where another corner takes over: limits of
+// the derivative on one side,
 //
 //   lim D(p + τ) for τ → 0 from one side,     D(p + τ): the tangent at p + τ, exact there
 //
@@ -78,12 +79,11 @@ class OneSided {
     *column = (at[0].derivative - 6.0 * at[1].derivative + 8.0 * at[2].derivative) / 3.0;
     // Scenes have sizes of about 1 in SI units, so that values of rounding alone are none.
     const double values = std::max(1.0, result_.values.cwiseAbs().maxCoeff());
-    const double size =
-        std::max(column->cwiseAbs().maxCoeff(), kNoDerivative * kSideWay * values / first_way);
+    const double none = kNoDerivative * kSideWay * values / first_way;
+    const double size = std::max(column->cwiseAbs().maxCoeff(), none);
     const double apart = (first - *column).cwiseAbs().maxCoeff();
     // Where bodies rest and nothing depends on the parameter, the derivatives are rounding.
-    const double rounding = kValueRounding * kSideWay * values / first_way;
-    if (!(apart <= kSidesConverged * size + rounding)) {
+    if (!(apart <= kSidesConverged * size + none)) {
       return Fail(parameter, "derivatives beside it do not converge: its largest is " + Text(size) +
                                  " or differs by " + Text(apart));
     }

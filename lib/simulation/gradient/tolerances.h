@@ -20,7 +20,7 @@ inline constexpr double kContinuous = 0.05;
 /// Of the values (over the parameter's size, of derivatives): rounding, added to both of the above.
 inline constexpr double kValueRounding = 1e-11;
 /// Of the values over the parameter's size: smaller derivatives count as 0.
-inline constexpr double kNoDerivative = 1e-9;
+inline constexpr double kNoDerivative = 1e-8;
 /// Of the parameter's largest derivative: smaller ones are rounding where those of the map are
 /// compared with those of the motion.
 inline constexpr double kNoEntry = 1e-9;

@@ -84,6 +84,7 @@ TEST(AccelerationFitTest, APhoneShowsLengthAndDamping) {
   const double truth[3] = {kLength, kDamping, kAngle};
   const FitResult exact = FitPhone(Record(0.0, 1));
   ASSERT_EQ(exact.status, FitStatus::kConverged) << exact.message;
+  EXPECT_EQ(exact.message.find("callback"), std::string::npos) << exact.message;
   for (int i = 0; i < 3; ++i) EXPECT_NEAR(exact.estimate[i], truth[i], 1e-6 * truth[i]) << i;
 
   const FitResult noisy = FitPhone(Record(0.02, 2));

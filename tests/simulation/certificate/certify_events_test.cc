@@ -414,5 +414,30 @@ TEST(CertifyEventsTest, ACubeThatSlidesAtTheLimitOfTippingIsAtAKink) {
   }
 }
 
+// A car whose rail's friction of 2 N stops it on a step's end, as what it carries begins to slide
+// on it with the same friction: it stays, or is taken along where its own is a little smaller.
+TEST(CertifyEventsTest, AStopAtTheLimitOfWhatBeginsToSlideIsAKink) {
+  const Scene scene = SceneOf(R"({"gravity": [0, 0], "bodies": [
+      {"name": "car", "mass": 1, "inertia": 1, "position": [0, 0]},
+      {"name": "b", "mass": 1, "inertia": 1, "position": [0, 0]}],
+      "joints": [{"name": "j0", "type": "prismatic", "bodies": ["car", "world"], "anchor": [0, 0],
+                  "axis": [1, 0], "friction": 2, "rate": 1},
+                 {"name": "r", "type": "prismatic", "bodies": ["b", "car"], "anchor": [0, 0],
+                  "axis": [1, 0], "friction": 2}],
+      "forces": [{"name": "f", "body": "b", "force": [-3, 0]}],
+      "simulation": {"dt": 0.01, "duration": 1, "stepping": "event"}})");
+  const auto by = [&](const char* path, DerivativeSide side) {
+    return FinalStateJacobian(scene, testing::Resolve(scene, {path}),
+                              {.method = GradientMethod::kTangent, .side = side});
+  };
+  const GradientResult plus = by("joints/j0/friction", DerivativeSide::kPlus);
+  EXPECT_EQ(plus.certificate.verdict.rfind("near a kink", 0), 0u) << plus.certificate.verdict;
+  ASSERT_TRUE(plus.done) << plus.message;
+  EXPECT_NEAR(plus.jacobian(0, 0), -0.04, 1e-6);
+  EXPECT_NEAR(by("joints/j0/friction", DerivativeSide::kMinus).jacobian(0, 0), 0.14, 1e-6);
+  EXPECT_NEAR(by("joints/r/friction", DerivativeSide::kPlus).jacobian(0, 0), -0.18, 1e-6);
+  EXPECT_NEAR(by("joints/r/friction", DerivativeSide::kMinus).jacobian(0, 0), 0.0, 1e-6);
+}
+
 }  // namespace
 }  // namespace tangible

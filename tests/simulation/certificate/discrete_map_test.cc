@@ -269,18 +269,20 @@ TEST(DiscreteMapTest, TheMapsDerivativeThroughABounceHasTheOtherSign) {
   }
 }
 
-Certificate OfTheStart(const std::string& text) {
+Certificate OfThe(const std::string& path, const std::string& text) {
   const Scene scene = SceneOf(text);
   Model<double> model;
   State<double> initial;
   BuildModel(scene, &model, &initial);
-  ParameterPath start;
+  ParameterPath number;
   std::string error;
-  EXPECT_TRUE(ResolveParameter(scene, "forces/f/start", &start, &error)) << error;
+  EXPECT_TRUE(ResolveParameter(scene, path, &number, &error)) << error;
   return CertifyDerivative(
-      model, initial, RowMatrixXd(VariableJacobian(scene, model.structure, {DirectionOf(start)})),
-      {"forces/f/start"});
+      model, initial, RowMatrixXd(VariableJacobian(scene, model.structure, {DirectionOf(number)})),
+      {path});
 }
+
+Certificate OfTheStart(const std::string& text) { return OfThe("forces/f/start", text); }
 
 // A box at rest with friction under it, on a floor, a table or a rail, is pushed from 0.103 s on:
 // the motion's derivative of its speed by that time is −(F − friction) / m, that of the map −F / m
@@ -315,6 +317,35 @@ TEST(DiscreteMapTest, APushThatStartsWithinAStepAsFrictionLetsGo) {
   std::string without = box(0.103, "", rail);
   without.replace(without.find("\"friction\": 5}"), 14, "\"friction\": 0}");
   EXPECT_EQ(OfTheStart(without).discrete_map, "");
+}
+
+// The same where the push sets in on a step's end, a disc's rolling friction lets go, or the path
+// of what carries a body begins.
+TEST(DiscreteMapTest, WhateverLetsFrictionGoIsTheMaps) {
+  const char* const disc = R"({"gravity": [0, -10], "bodies": [{"name": "b", "mass": 1,
+      "shape": {"circle": {"radius": 0.1}}, "position": [0, 0.1], "friction": 0.5,
+      "rolling_friction": 0.02}, {"name": "floor", "static": true, "friction": 0.5,
+      "rolling_friction": 0.02, "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
+      "forces": [{"name": "f", "body": "b", "force": [4, 0], "start": )";
+  for (const double start : {0.1, 0.103}) {
+    const std::string text =
+        disc + Exact(start) + R"(}], "simulation": {"dt": 0.01, "duration": 0.3}})";
+    EXPECT_NE(OfTheStart(text).discrete_map.find("start of force f, as friction lets go"),
+              std::string::npos)
+        << start;
+  }
+  for (const double dt : {0.01, 0.0073}) {
+    const Certificate c = OfThe("bodies/belt/motion/delay", R"({"gravity": [0, -10], "bodies": [
+        {"name": "belt", "kinematic": true, "position": [0, -0.05], "friction": 0.4,
+         "shape": {"box": {"size": [20, 0.1]}}, "motion": {"time": [0, 0.5, 1.5],
+         "x": [0, 0, 2], "interpolation": "linear", "delay": 0}},
+        {"name": "b", "shape": {"box": {"size": [0.2, 0.1]}}, "mass": 1, "position": [0, 0.05],
+         "friction": 0.4}], "simulation": {"dt": )" + Exact(dt) +
+                                                                R"(, "duration": 1.25}})");
+    EXPECT_NE(c.discrete_map.find("jump of the path of belt, as friction lets go"),
+              std::string::npos)
+        << c.discrete_map << dt;
+  }
 }
 
 }  // namespace

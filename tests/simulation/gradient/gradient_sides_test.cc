@@ -417,6 +417,19 @@ TEST(GradientSidesTest, APuckAtRestUnderALoadBeyondItsSupport) {
   }
 }
 
+// A puck that its support stops exactly on the end of a fixed step: v_k = v − k h μ L / m for k up
+// to n, where v_n is a little above 0 on one side, and nothing on the other.
+TEST(GradientSidesTest, ASupportThatStopsOnAFixedStepsEnd) {
+  const Scene scene = SceneOf(R"({"gravity": [0, 0], "bodies": [
+      {"name": "puck", "mass": 1, "inertia": 1, "position": [0, 0], "velocity": [1, 0],
+       "support": {"load": 10, "friction": 0.5}}],
+      "simulation": {"dt": 0.01, "duration": 0.5}})");
+  EXPECT_NEAR(Plus(scene, "bodies/puck/velocity/x", 0), 0.2, 1e-7);
+  EXPECT_NEAR(Minus(scene, "bodies/puck/velocity/x", 0), 0.19, 1e-7);
+  EXPECT_NEAR(Plus(scene, "bodies/puck/support/friction", 0), -0.19, 1e-7);
+  EXPECT_NEAR(Minus(scene, "bodies/puck/support/friction", 0), -0.21, 1e-7);
+}
+
 // A window that ends, or opens, as its force steps from 1 N to 3 N: what is gained or lost on each
 // side is the force of that side. As another force steps, there is one derivative.
 TEST(GradientSidesTest, AWindowsEdgeWhereItsOwnSignalSteps) {

@@ -261,5 +261,120 @@ TEST(SupportSharesTest, ABrakeBesideASupportHasNoDerivativeBySpeed) {
   }
 }
 
+// A car on its support and a body that a rail's friction of 2 N holds on it are braked by 3 N each,
+// and stop at 2 v / 6 = 0.4 s, the end of a step: there the body begins to slide, with
+// (F + 2) (T - t).
+TEST(SupportSharesTest, WhatStopsOnAStepsEndWhileAnotherRowBeginsToSlide) {
+  for (const double dt : {0.01, 0.05, 0.0073}) {
+    Scene scene = SceneOf(R"({"gravity": [0, 0], "bodies": [
+        {"name": "car", "mass": 1, "inertia": 1, "position": [0, 0],
+         "velocity": [1.2000000000000002, 0], "support": {"friction": 0.3, "load": 10}},
+        {"name": "b", "mass": 1, "inertia": 1, "position": [0, 0],
+         "velocity": [1.2000000000000002, 0]}],
+        "joints": [{"name": "r", "type": "prismatic", "bodies": ["b", "car"], "anchor": [0, 0],
+                    "axis": [1, 0], "friction": 2}],
+        "forces": [{"name": "f", "body": "b", "force": [-3, 0]}],
+        "simulation": {"dt": 0.01, "duration": 1, "stepping": "event"}})");
+    scene.simulation.dt = dt;
+    const std::vector<std::string> paths = {"bodies/car/support/friction", "forces/f/force/x"};
+    const GradientResult result = Jacobian(scene, paths, GradientMethod::kAdjoint);
+    ASSERT_TRUE(result.done) << result.message;
+    EXPECT_NEAR(result.values[6 + 3], -0.6, 1e-9) << dt;
+    EXPECT_NEAR(result.jacobian(6, 0), -0.8, 1e-7) << dt;
+    EXPECT_NEAR(result.jacobian(6, 1), 0.26, 1e-7) << dt;
+    EXPECT_NEAR(result.jacobian(6 + 3, 0), -2.0 / 3.0, 1e-7) << dt;
+    EXPECT_NEAR(result.jacobian(6 + 3, 1), 2.0 / 3.0, 1e-7) << dt;
+    ExpectOthersAgree(scene, paths, result);
+  }
+}
+
+// Links of 0.2 m that stand on points at their hinges, the first of an arm at its pivot, and are
+// pushed at the tip.
+Scene Links(int num, bool has_pivot, double push, double dt, Stepping stepping) {
+  std::string bodies, joints;
+  for (int i = 0; i < num; ++i) {
+    const std::string name = std::to_string(i);
+    bodies += std::string(i > 0 ? "," : "") + R"({"name": "l)" + name +
+              R"(", "mass": 0.5, "shape": {"box": {"size": [0.2, 0.04]}}, "position": [)" +
+              std::to_string(0.1 + 0.2 * i) + R"(, 0],
+              "support": {"friction": 0.3, "points": [[0.1, 0], [-0.1, 0]]}})";
+    if (i == 0 && !has_pivot) continue;
+    joints += std::string(joints.empty() ? "" : ",") + R"({"name": "j)" + name +
+              R"(", "type": "revolute", "bodies": ["l)" + name + R"(", ")" +
+              (i == 0 ? "world" : "l" + std::to_string(i - 1)) + R"("], "anchor": [)" +
+              std::to_string(0.2 * i) + ", 0]}";
+  }
+  Scene scene =
+      SceneOf(R"({"gravity": [0, 0], "bodies": [)" + bodies + R"(], "joints": [)" + joints +
+              R"(], "forces": [{"name": "f", "body": "l)" + std::to_string(num - 1) +
+              R"(", "at": [0.1, 0], "force": [0, 1]}],
+              "simulation": {"dt": 0.01, "duration": 0.5}})");
+  scene.forces[0].force.y() = push;
+  scene.simulation.dt = dt;
+  scene.simulation.stepping = stepping;
+  return scene;
+}
+
+// What their friction at rest shares is found by fixed steps, where a point at a pivot has no
+// velocity and a link must not be taken to be held as a whole, and by events.
+TEST(SupportSharesTest, LinksThatStandOnTheirHinges) {
+  const auto end = [](const Scene& scene) {
+    Model<double> model;
+    State<double> state, final;
+    BuildModel(scene, &model, &state);
+    const RolloutReport report = Rollout(model, state, nullptr, &final);
+    EXPECT_EQ(report.status, StepStatus::kDone) << report.message;
+    return VectorX<double>(Eigen::Map<VectorX<double>>(final.pose.data(), 3 * scene.bodies.size()));
+  };
+  const VectorX<double> coarse = end(Links(3, false, 3.0, 2e-3, Stepping::kFixed));
+  const VectorX<double> fine = end(Links(3, false, 3.0, 1e-3, Stepping::kFixed));
+  EXPECT_GT(fine[7], 0.328);  // the last one has moved by 0.3 m
+  EXPECT_LT((coarse - fine).cwiseAbs().maxCoeff(), 0.01);
+  // At first order.
+  const VectorX<double> arm = end(Links(2, true, 4.0, 1e-3, Stepping::kFixed));
+  const VectorX<double> finer = end(Links(2, true, 4.0, 5e-4, Stepping::kFixed));
+  const VectorX<double> by_events = end(Links(2, true, 4.0, 0.01, Stepping::kEvent));
+  EXPECT_LT((2.0 * finer - arm - by_events).cwiseAbs().maxCoeff(), 5e-4);
+  end(Links(2, false, 2.0, 0.01, Stepping::kEvent));
+}
+
+// An impact that restitution makes as a step ends is that of a moment before, or behind.
+TEST(SupportSharesTest, AnImpactOnABodyOnItsSupportAsAStepEnds) {
+  Scene scene = SceneOf(R"({"gravity": [0, 0], "bodies": [
+      {"name": "a", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0, 0],
+       "velocity": [0.5, 0], "restitution": 0.5},
+      {"name": "b", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0.5, 0],
+       "restitution": 0.5, "support": {"friction": 0.3}}],
+      "simulation": {"dt": 0.01, "duration": 0.6}})");
+  const GradientResult at = Jacobian(scene, {"bodies/b/position/x"}, GradientMethod::kTangent);
+  for (const double apart : {-1e-9, 1e-9}) {
+    scene.bodies[1].position.x() = 0.5 + apart;
+    const GradientResult beside =
+        Jacobian(scene, {"bodies/b/position/x"}, GradientMethod::kTangent);
+    EXPECT_LT((beside.values - at.values).cwiseAbs().maxCoeff(), 1e-8);
+  }
+  EXPECT_EQ(at.certificate.verdict.rfind("of the discrete map: ", 0), 0u);
+}
+
+// A pushed box on four points and a disc that it pushes off its middle come to rest together, a
+// little in penetration.
+TEST(SupportSharesTest, BodiesInContactComeToRestTogether) {
+  for (const double dt : {0.01, 0.005, 0.002, 0.001}) {
+    Scene scene = SceneOf(R"({"gravity": [0, 0], "bodies": [
+        {"name": "box", "shape": {"box": {"size": [0.2, 0.2]}}, "mass": 1, "position": [0, 0],
+         "velocity": [0.5, 0], "friction": 0.25, "support": {"friction": 0.5,
+         "points": [[0.1, 0.1], [-0.1, 0.1], [-0.1, -0.1], [0.1, -0.1]]}},
+        {"name": "disc", "shape": {"circle": {"radius": 0.1}}, "mass": 2, "position": [0.2, 0.02],
+         "velocity": [0.5, 0], "friction": 0.25, "support": {"friction": 0.5}}],
+        "simulation": {"dt": 0.01, "duration": 0.3}})");
+    scene.simulation.dt = dt;
+    const GradientResult result =
+        Jacobian(scene, {"bodies/disc/mass"}, GradientMethod::kTangent, CertificatePass::kSkip);
+    EXPECT_TRUE(result.done) << result.message;
+    if (!result.done) continue;
+    EXPECT_LT(std::abs(result.values[3]) + std::abs(result.values[9]), 1e-6) << dt;
+  }
+}
+
 }  // namespace
 }  // namespace tangible
