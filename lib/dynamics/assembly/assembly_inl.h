@@ -275,11 +275,14 @@ class ProblemBuilder {
     }
     if constexpr (kLevel == Level::kVelocity) {
       const bool is_gap = contact.law == ContactLaw::kGap && contact.IsOfShapes();
-      if (is_gap) block.rounding = PositionRounding(state_, contact.a, contact.b) / at_.h;
-      // Both rows of a body that just fits between two walls would contradict each other. The
-      // derivative of the gap stays.
-      const double none = kGapRounding / kCornerRounding * block.rounding;
-      if (is_gap && std::abs(ValueOf(c_n)) <= none) block.c_n -= T(ValueOf(c_n));
+      const double rounding = PositionRounding(state_, contact.a, contact.b) / at_.h;
+      if (is_gap) block.rounding = rounding;
+      // Both rows of a body that just fits between two walls would contradict each other, and those
+      // of a taut rope and of a support that holds its body. The derivative of the gap stays.
+      const bool is_limit = contact.law == ContactLaw::kGap && contact.joint >= 0 &&
+                            !contact.IsPureFriction() && !s_.supports.empty();
+      const double none = kGapRounding / kCornerRounding * rounding;
+      if ((is_gap || is_limit) && std::abs(ValueOf(c_n)) <= none) block.c_n -= T(ValueOf(c_n));
       block.c_n += PrescribedSpeed(s_, state_, contact.a, rows.normal_a, contact.b, rows.normal_b);
       block.c_t +=
           PrescribedSpeed(s_, state_, contact.a, rows.tangent_a, contact.b, rows.tangent_b);

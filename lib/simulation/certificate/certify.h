@@ -205,7 +205,7 @@ class RolloutCertifier {
   InnerImpulses inner_impulses_;
   std::optional<CoordinateWatch> coordinates_;    ///< from the first step on
   std::optional<DiscreteMapWatch> discrete_map_;  ///< from the first fixed step on
-  std::vector<ActiveContact> held_last_;  ///< by friction, in the last step
+  std::vector<ActiveContact> held_last_;          ///< by friction, in the last step
   std::string made_last_;  ///< of the last step; empty if no contact was made in it
   double step_margin_ = std::numeric_limits<double>::infinity();
   double margin_beside_ = std::numeric_limits<double>::infinity();  ///< without contacts at a kink

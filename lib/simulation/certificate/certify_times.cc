@@ -21,6 +21,8 @@ std::string WhereItSteps(const std::string& which, const std::string& other) {
   return which + " s is where " + other + " steps";
 }
 
+bool IsReadBefore(const StateRead& x, const StateRead& y) { return x.steps < y.steps; }
+
 // What else than `own` jumps at a time, to `near`; empty: nothing does.
 std::string OtherJump(const Model<double>& model, double time, double near,
                       const std::string& own) {
@@ -33,7 +35,7 @@ std::string OtherJump(const Model<double>& model, double time, double near,
 }  // namespace
 
 RolloutCertifier::RolloutCertifier(CertifyOptions options) : options_(std::move(options)) {
-  std::ranges::stable_sort(options_.reads, std::ranges::less(), &StateRead::steps);
+  std::stable_sort(options_.reads.begin(), options_.reads.end(), IsReadBefore);
 }
 
 void RolloutCertifier::AddForceWindows(const Model<double>& model) {
@@ -114,8 +116,8 @@ void RolloutCertifier::AddReleases(const Model<double>& model) {
 }
 
 std::span<const StateRead> RolloutCertifier::ReadsAfter(long steps) const {
-  const auto [first, last] =
-      std::ranges::equal_range(options_.reads, steps, std::ranges::less(), &StateRead::steps);
+  const auto [first, last] = std::equal_range(options_.reads.begin(), options_.reads.end(),
+                                              StateRead{.steps = steps}, IsReadBefore);
   return {first, last};
 }
 
@@ -124,8 +126,8 @@ bool RolloutCertifier::IsRead(const ModelStructure& structure, long steps) const
 }
 
 bool RolloutCertifier::IsReadAt(const ModelStructure& structure, double time) const {
-  const auto at_or_behind =
-      std::ranges::partition_point(options_.reads, [&](const StateRead& read) {
+  const auto at_or_behind = std::partition_point(
+      options_.reads.begin(), options_.reads.end(), [&](const StateRead& read) {
         const double at = StepTime(structure.settings, read.steps);
         return at < time && !IsSameInstant(structure, time, at);
       });
@@ -147,7 +149,8 @@ bool RolloutCertifier::MovesRead(const ModelStructure& structure, long steps,
     return std::any_of(structure.joints.begin(), structure.joints.end(),
                        [&](const JointIndex& joint) { return joint.a == body || joint.b == body; });
   };
-  return std::ranges::any_of(ReadsAfter(steps), [&](const StateRead& read) {
+  const std::span<const StateRead> reads = ReadsAfter(steps);
+  return std::any_of(reads.begin(), reads.end(), [&](const StateRead& read) {
     return read.body < 0 || read.body == whole.a || read.body == whole.b || is_joined(contact.a) ||
            is_joined(contact.b);
   });

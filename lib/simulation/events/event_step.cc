@@ -26,7 +26,7 @@ constexpr int kMostForced = 3;
 constexpr int kMostEllipseHalvings = 40;
 constexpr int kMostEllipseMotions = 10000;
 // How many motions that end before an event or a given time a step may have.
-constexpr int kMostShortened = 30000;
+constexpr int kMostMotions = 30000;
 // After more than this many times max_events_per_step events a step is given up.
 constexpr int kGiveUp = 3;
 
@@ -734,7 +734,7 @@ StepReport EventStepper::Advance(const Model<double>& model, double t, double h,
   };
   bool at_given_time = true;
   bool begins = true;
-  int num_shortened = 0;
+  int num_motions = 0;
   EdgeGroup due;  // at the instant of the event that has ended the last motion
   if (!FollowAfter(model, t, state, &outcome)) return fail();
   while (end - now > kTimeRounding * h || !at_given_time) {
@@ -776,7 +776,7 @@ StepReport EventStepper::Advance(const Model<double>& model, double t, double h,
     if (at_given_time) {
       now = segment.length < until - now ? now + segment.length : until;
       outcome.events += EndAtGivenTime(now < goal, next, &segment);
-      if (now < goal && ++num_shortened < kMostShortened) continue;
+      if (now < goal && ++num_motions < kMostMotions) continue;
       if (now < goal) {
         outcome.message = "motions do not end: a body is too slow on its support";
         return fail();

@@ -233,12 +233,17 @@ void SupportIteration::Linearise(const double mass[3], const double twist[3], co
 void SupportIteration::MoveAbout(const double mass[3], const double twist[3],
                                  SupportState* at) const {
   std::copy_n(twist, 3, at->twist.begin());
-  if (friction_.is_disc() || friction_.points().size() < 2) return;
+  const double slow = kStandingPoint * friction_.limit() / mass[0];
+  if (at->holds != SupportState::kNothing) return;
+  if (friction_.is_disc()) {
+    const double speed = std::hypot(twist[0], twist[1], friction_.arm() * twist[2]);
+    if (speed <= slow) at->holds = SupportState::kBody;
+    return;
+  }
   for (size_t i = 0; i < friction_.points().size() && at->holds == SupportState::kNothing; ++i) {
     double velocity[2];
     friction_.points()[i].VelocityAt(twist, velocity);
-    const double speed = std::hypot(velocity[0], velocity[1]);
-    if (speed <= kStandingPoint * friction_.limit() / mass[0]) at->holds = static_cast<int>(i);
+    if (std::hypot(velocity[0], velocity[1]) <= slow) at->holds = static_cast<int>(i);
   }
 }
 

@@ -67,9 +67,12 @@ double GainOfPart(const SupportFriction& friction, int part, const double twist[
   return gain;
 }
 
-// What is held of a support where all of a part of it is.
+// What is held of a support where all of a part of it is: a single point does not keep its body
+// from turning.
 int WholeOf(const SupportIndex& support, int part) {
-  return support.kind == SupportIndex::kCentre ? 0 : part;
+  const bool one = support.kind == SupportIndex::kCentre ||
+                   (support.kind == SupportIndex::kPoints && support.num_points == 1);
+  return one ? 0 : part;
 }
 
 const double* NumbersOfBlock(const Model<double>& model, int k, const std::vector<double>& values) {
@@ -133,12 +136,16 @@ SupportModes::Course SupportModes::CourseOf(const Model<double>& model, int k, d
   const auto rests = [&](int part) { return SpeedOfPart(friction_, part, twist) <= rest_of(part); };
   const double speed = SpeedOfPart(friction_, SupportState::kBody, twist);
   speeds_[k] = speed;
-  const int whole =
-      support.kind == SupportIndex::kCentre ? 0 : static_cast<int>(SupportState::kBody);
+  const int whole = WholeOf(support, SupportState::kBody);
   if (rests(whole)) {
     const BodyIndex& body = model.structure->bodies[support.body];
     const double lever = std::sqrt(model.parameters[body.inertia] / model.parameters[body.mass]);
     turns_[k] = lever * std::abs(twist[2]) > rest_of(whole) ? 1 : 0;
+    if (turns_[k] != 0 && support.kind == SupportIndex::kPoints && whole == 0) {
+      std::copy_n(twist, 3, at->twist.begin());
+      at->holds = 0;
+      return Course::kTurns;
+    }
     return Course::kRests;
   }
   std::copy_n(twist, 3, at->twist.begin());

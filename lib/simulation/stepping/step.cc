@@ -473,7 +473,8 @@ ContactSolverReport Stepper::SolveWithSupports(const Model<double>& model,
   for (;;) {
     AssembleWithoutContacts(model, r.before, r.time, h, &r.problem, &scratch_);
     ContactSolverReport solved = SolveWithContacts(model, state, h, report);
-    if (!solved.solved && !supports_.has_given_up() && supports_.Release(model, &r.before)) continue;
+    if (!solved.solved && !supports_.has_given_up() && supports_.Release(model, &r.before))
+      continue;
     if (!solved.solved) return solved;
     if (supports_.Accept(model, r.problem, r.solution, &r.before)) {
       SupportIteration::KeepAtRest(*model.structure, &r);

@@ -376,5 +376,60 @@ TEST(SupportSharesTest, BodiesInContactComeToRestTogether) {
   }
 }
 
+// The pose of the first body at the end, of a run that is done.
+std::vector<double> EndOf(const Scene& scene) {
+  Model<double> model;
+  State<double> state, final;
+  BuildModel(scene, &model, &state);
+  const RolloutReport report = Rollout(model, state, nullptr, &final);
+  EXPECT_EQ(report.status, StepStatus::kDone) << report.message;
+  std::vector<double> end(final.pose.begin(), final.pose.begin() + 3);
+  end.insert(end.end(), final.twist.begin(), final.twist.begin() + 3);
+  return end;
+}
+
+// A rope that becomes taut is 1e-15 m too long, or too short, where its body comes to rest.
+TEST(SupportSharesTest, ABodyOnATautRopeComesToRest) {
+  for (const double dt : {0.01, 0.005, 0.002}) {
+    Scene scene = SceneOf(R"({"gravity": [0, 0], "bodies": [
+        {"name": "b", "mass": 1, "inertia": 0.01, "position": [0.2, 0], "velocity": [1, 0],
+         "angular_velocity": 1, "support": {"friction": 0.3, "points": [[-0.2, 0], [0.2, 0]]}}],
+        "joints": [{"name": "rope", "type": "distance", "bodies": ["b", "world"],
+                    "anchors": [[0.4, 0], [0.3, -0.3]], "limits": [0, 0.4]}],
+        "simulation": {"dt": 0.01, "duration": 0.8}})");
+    scene.simulation.dt = dt;
+    const std::vector<double> end = EndOf(scene);
+    EXPECT_NEAR(end[0], 0.3651, 0.01) << dt;  // where it stops by events
+    for (int i = 3; i < 6; ++i) EXPECT_NEAR(end[i], 0.0, 1e-9) << dt;
+  }
+}
+
+// A single point keeps nothing from turning: where it comes to rest its body goes on about it.
+// Against an integrator of smoothed friction.
+TEST(SupportSharesTest, ASinglePointThatRestsIsAPivot) {
+  Scene scene = SceneOf(R"({"gravity": [0, 0], "bodies": [
+      {"name": "l0", "mass": 1, "inertia": 0.01, "position": [0.2, 0], "angular_velocity": 3},
+      {"name": "l1", "mass": 1, "inertia": 0.01, "position": [0.6, 0],
+       "support": {"friction": 0.3, "points": [[0, 0]]}}],
+      "joints": [{"name": "j1", "type": "revolute", "bodies": ["l1", "l0"], "anchor": [0.4, 0]}],
+      "simulation": {"dt": 0.01, "duration": 0.5, "stepping": "event"}})");
+  EXPECT_NEAR(EndOf(scene)[0], 0.263556, 2e-6);
+}
+
+// A limit that stops an arm on its disc in the first step leaves no direction for its friction.
+TEST(SupportSharesTest, AnArmThatItsLimitStopsAtOnce) {
+  const Scene scene = SceneOf(R"({"gravity": [0, 0], "bodies": [
+      {"name": "l0", "mass": 1, "inertia": 0.003333333, "angle": 0.5,
+       "position": [0.087758256189, 0.04794255386], "support": {"friction": 0.3, "radius": 0.1}},
+      {"name": "l1", "mass": 1, "inertia": 0.003333333, "angle": 0.5,
+       "position": [0.263274768567, 0.143827661581], "support": {"friction": 0.3, "radius": 0.1}}],
+      "joints": [{"name": "j0", "type": "revolute", "bodies": ["l0", "world"], "anchor": [0, 0],
+                  "limits": [-0.5, 0], "rate": 3},
+                 {"name": "j1", "type": "revolute", "bodies": ["l1", "l0"],
+                  "anchor": [0.175516512378, 0.095885107721]}],
+      "simulation": {"dt": 0.002, "duration": 0.1}})");
+  EXPECT_LT(EndOf(scene)[2], 0.5 + 1e-9);
+}
+
 }  // namespace
 }  // namespace tangible
