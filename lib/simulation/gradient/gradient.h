@@ -36,8 +36,8 @@ enum class RadiusPass { kRun, kSkip };
 /// At a kink: one element of the generalised Jacobian (that of the modes found); or the derivative
 /// for growing parameters (kPlus), or for shrinking ones (kMinus: lim (f(p) − f(p − h)) / h), each
 /// parameter alone. Only the tangent has one-sided derivatives, so that auto then selects it. With
-/// fixed steps they are exact (rollout_directional.h); with event stepping, at a kink, they are
-/// extrapolated from tangents beside it (gradient_sides.cc).
+/// fixed steps they are exact where contacts are at a kink (rollout_directional.h); at all others,
+/// and with event stepping, they are extrapolated from tangents beside it (gradient_sides.cc).
 enum class DerivativeSide { kBoth, kPlus, kMinus };
 
 struct GradientOptions {

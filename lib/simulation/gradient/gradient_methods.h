@@ -30,8 +30,8 @@ std::string FailureOf(const GradientProblem& problem, const RolloutOutput& outpu
 bool Take(const GradientProblem& problem, const RolloutOutput& output, GradientResult* result);
 
 /// Fills values and jacobian; false with a message where a rollout fails or no side has a limit.
-/// Uses tangents at parameters beside those of the scene: for event stepping, at a kink. Reads the
-/// certificate.
+/// Uses tangents at parameters beside those of the scene: for event stepping, at a kink, and for
+/// fixed steps at what their directional derivatives do not resolve. Reads the certificate.
 bool JacobianBySides(const GradientProblem& problem, DerivativeSide side, RolloutWorker* worker,
                      GradientResult* result);
 /// Of fixed steps, whose directional derivatives do not resolve them: replaces the columns of
