@@ -384,7 +384,7 @@ class Equations {
   void DampenPoint(const SupportIndex& support, int point, const SupportState& at,
                    const Vector2<T>& along, const Vector2<T>& arm, const T& damping) {
     const RowPart<T> row = PointRow(along, arm);
-    DampenSupport(support.body, row, damping);
+    DampenSupport(support.body, at, row, damping);
     if constexpr (kLevel == Level::kAcceleration) {
       if (at.slow != point) return;
       T buffer[3];
@@ -394,11 +394,17 @@ class Equations {
     }
   }
 
-  void DampenSupport(int body, const RowPart<T>& row, const T& damping) {
+  void DampenSupport(int body, const SupportState& at, const RowPart<T>& row, const T& damping) {
+    const RowPart<T> none{T(0.0), T(0.0), T(0.0)};
     if constexpr (kLevel == Level::kVelocity) {
-      b_.Along(body, row, s_.world(), {T(0.0), T(0.0), T(0.0)}, T(0.0), damping);
+      b_.Along(body, row, s_.world(), none, T(0.0), damping);
     } else {
       b_.Dampen(body, row, damping);
+      if (!(at.horizon > 0.0)) return;
+      T buffer[3];
+      const T* twist = b_.TwistOf(body, buffer);
+      const T speed = row[0] * twist[0] + row[1] * twist[1] + row[2] * twist[2];
+      b_.Push(body, row, s_.world(), none, T(-damping * speed / at.horizon));
     }
   }
 
@@ -435,7 +441,7 @@ class Equations {
     for (int r = 0; r < 3; ++r) {
       RowPart<T> row{T(0.0), T(0.0), T(0.0)};
       row[r] = T(1.0);
-      DampenSupport(support.body, row, T(limit * dampers[r]));
+      DampenSupport(support.body, at, row, T(limit * dampers[r]));
     }
   }
 
@@ -454,7 +460,7 @@ class Equations {
         b_.Along(support.body, row, s_.world(), none, T(damping * speed), damping);
       } else {
         b_.Push(support.body, row, s_.world(), none, T(damping * speed));
-        b_.Dampen(support.body, row, damping);
+        DampenSupport(support.body, at, row, damping);
       }
     }
   }

@@ -28,6 +28,12 @@
 //
 // a force and a damper across it. At the solution v_i = v̂_i, so that the damper gives nothing but
 // the derivative. A point that does not slide is held by two rows, a body at rest by three.
+//
+// Between events a velocity tells the direction of its friction, but where it is small friction
+// turns it into that of what pushes it at the rate μ N / (m |v|), without bound as it vanishes. A
+// body that starts has the friction of its acceleration a; one that creeps, pushed by little less
+// than its friction, that of v + τ a, its velocity a time τ later: motions of that length are
+// stable, and what τ neglects is v / (μ N / m) of the turn of what pushes.
 
 #include <cmath>
 #include <vector>

@@ -12,23 +12,29 @@ namespace {
 
 using PathPoint = RecordedPath::Point;
 
-// Times that differ by less are one instant, s.
-double InstantWidth(const ModelStructure& structure, double time) {
-  return std::max(kSameInstantShare * structure.settings.dt, kInstantRounding * std::abs(time));
+// How much later than its time a knot of a path counts where a time tells the pieces: knots of
+// several paths that differ by rounding are told apart, in the order of the paths.
+double ShiftOf(const ModelStructure& structure, int path, double time) {
+  return 4.0 * path * InstantWidth(structure, time);
+}
+double ShiftOf(const ModelStructure& structure, const PathIndex& index, double time) {
+  return ShiftOf(structure, static_cast<int>(&index - structure.paths.data()), time);
 }
 
 // A column of a body's path at a time of the run.
 PathPoint PointOf(const Model<double>& model, const PathIndex& index, int column, double time,
                   double inside) {
   const double delay = model.parameters[index.numbers + kPathDelay];
-  return index.path->At(column, time - delay, inside - delay);
+  return index.path->At(column, time - delay,
+                        inside - ShiftOf(*model.structure, index, time) - delay);
 }
 
 // The point with the means of its one-sided derivatives at an instant.
 PathPoint MeanAt(const PathIndex& index, int column, double time, double delay,
                  const ModelStructure& structure) {
   const auto at = [&](PathSide side) {
-    return index.path->At(column, time - delay, BesideInstant(structure, time, side) - delay);
+    const double inside = BesideInstant(structure, time, side) - ShiftOf(structure, index, time);
+    return index.path->At(column, time - delay, inside - delay);
   };
   const PathPoint before = at(PathSide::kBefore);
   const PathPoint after = at(PathSide::kAfter);
@@ -139,9 +145,18 @@ void Backwards(const Model<double>& model, const ForEach& for_each, RowMatrixXd*
 
 }  // namespace
 
+double InstantWidth(const ModelStructure& structure, double time) {
+  return std::max(kSameInstantShare * structure.settings.dt, kInstantRounding * std::abs(time));
+}
+
 double BesideInstant(const ModelStructure& structure, double time, PathSide side) {
-  const double width = 2.0 * InstantWidth(structure, time);
-  return side == PathSide::kAfter ? time + width : time - width;
+  const int last = std::max(static_cast<int>(structure.paths.size()) - 1, 0);
+  if (side == PathSide::kAfter) return BehindPath(structure, time, last);
+  return time - 2.0 * InstantWidth(structure, time);
+}
+
+double BehindPath(const ModelStructure& structure, double time, int path) {
+  return time + (ShiftOf(structure, path, time) + 2.0 * InstantWidth(structure, time));
 }
 
 bool IsSameInstant(const ModelStructure& structure, double a, double b) {
@@ -153,7 +168,9 @@ void FollowPathsAt(const Model<T>& model, const T& time, double inside, State<T>
   ForEachColumn(model, [&](const PathIndex& index, int column) {
     const T* numbers = &model.parameters[index.numbers];
     const T u = time - numbers[kPathDelay];
-    const PathPoint p = index.path->At(column, ValueOf(u), inside - ValueOf(numbers[kPathDelay]));
+    const double shift = ShiftOf(*model.structure, index, ValueOf(time));
+    const PathPoint p =
+        index.path->At(column, ValueOf(u), inside - shift - ValueOf(numbers[kPathDelay]));
     const std::size_t place = 3 * static_cast<std::size_t>(index.body) + column;
     state->pose[place] = Placed(numbers, column, Linear(p.value, p.rate, u));
     state->twist[place] = Scaled(numbers, column, Linear(p.rate, p.acceleration, u));
@@ -184,7 +201,9 @@ void GivenAccelerations(const Model<T>& model, const T& time, double inside,
   ForEachColumn(model, [&](const PathIndex& index, int column) {
     const T* numbers = &model.parameters[index.numbers];
     const T u = time - numbers[kPathDelay];
-    const PathPoint p = index.path->At(column, ValueOf(u), inside - ValueOf(numbers[kPathDelay]));
+    const double shift = ShiftOf(*model.structure, index, ValueOf(time));
+    const PathPoint p =
+        index.path->At(column, ValueOf(u), inside - shift - ValueOf(numbers[kPathDelay]));
     (*accelerations)[3 * static_cast<std::size_t>(index.body) + column] =
         Scaled(numbers, column, Linear(p.acceleration, p.jerk, u));
   });

@@ -10,7 +10,8 @@
 // which overwrite the state wherever the equations are evaluated, so that nothing accumulates:
 //
 //   by events       at every instant, with the exact twist and acceleration, of the side of a knot
-//                   that an interior time of the motion tells
+//                   that an interior time of the motion tells; of several bodies' knots at one
+//                   instant, as in recordings of one camera, it tells how many have been passed
 //   by fixed steps  at the start of a step, with the twist (q(t + h) − q(t)) / h, which takes them
 //                   to q(t + h): contacts and joints of the discrete map see where they go
 //
@@ -33,6 +34,11 @@ enum class PathSide { kBefore, kAfter };
 
 /// A time inside the piece on the given side of `time`, beyond the knots that fall on that instant.
 double BesideInstant(const ModelStructure& structure, double time, PathSide side);
+/// A time at which of the knots that fall on the instant of `time` those of the first paths, up to
+/// and with this one, are passed: knots of several paths at one instant are passed in their order.
+double BehindPath(const ModelStructure& structure, double time, int path);
+/// Times that differ by no more than this are one instant there, s.
+double InstantWidth(const ModelStructure& structure, double time);
 /// Whether two times are one instant: knots and the ends of steps differ by rounding.
 bool IsSameInstant(const ModelStructure& structure, double a, double b);
 

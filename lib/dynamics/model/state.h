@@ -24,6 +24,9 @@ struct SupportState {
   /// Where Newton's method goes round in circles: s > 0, m/s, and friction is −μ N v / √(v̂² + s²),
   /// a damper, in all that slides.
   double secant = 0.0;
+  /// Of a body that creeps: τ > 0, s, and friction is sought against a + v / τ, the motion that is
+  /// left after that time, instead of the accelerations alone (support.h).
+  double horizon = 0.0;
   bool IsSlow(int point) const { return slow == kBody || slow == point; }
   friend bool operator==(const SupportState&, const SupportState&) = default;
 };

@@ -129,6 +129,7 @@ class RolloutCertifier {
                           EventDerivative* derivative) const;
   bool SlidesAtLimit(const Model<double>& model, ContactMode by_share, size_t contact,
                      EventDerivative* derivative, Segment* segment) const;
+  void AddOrder(const Model<double>& model, const Segment& segment);
   void AddSplits(const Model<double>& model, long step, const Segment& segment);
   void AddImpact(const Model<double>& model, long step, Impulses* impact);
   void AddOtherSlips(const Model<double>& model, const Segment& segment, const Place& place);

@@ -460,12 +460,24 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
   closed_ = segment->contacts;
   if (Wanted(segment->edge_before) ||
       (segment->edge_before >= 0 && Wanted(segment->event_number))) {
-    OneSided("windows of two forces open or close at " + Short(segment->time) +
-             " s, where their order matters");
+    AddOrder(model, *segment);
   }
   AddLimitsAtRelease(model, step, *segment);
   AddEventOf(model, step, derivative, segment);
   AddQuality(*model.structure, start.problem, segment->modes, segment->friction, &start.system);
+}
+
+// Edges at one instant whose order matters.
+void RolloutCertifier::AddOrder(const Model<double>& model, const Segment& segment) {
+  const bool are_paths = IsPathsDelay(*model.structure, segment.edge_before);
+  if (are_paths && Directions().rows() > 0 &&
+      CoupledPaths(model, Directions(), segment.event_number, segment.edge_before, segment.time)
+          .empty()) {
+    return;  // they vary alike
+  }
+  OneSided((are_paths ? "the speeds of two driven bodies jump at "
+                      : "windows of two forces open or close at ") +
+           Short(segment.time + segment.length) + " s, where their order matters");
 }
 
 // An event on the end of a step: beside it, it splits the motion before that end or the one behind

@@ -23,11 +23,14 @@ std::string WhereItSteps(const std::string& which, const std::string& other) {
 
 bool IsReadBefore(const StateRead& x, const StateRead& y) { return x.steps < y.steps; }
 
-// What else than `own` jumps at a time, to `near`; empty: nothing does.
-std::string OtherJump(const Model<double>& model, double time, double near,
+// What else than `own` jumps at a time, to `near`; empty: nothing does. Beside the knot of a path,
+// those of other paths do not count: they are passed one after another, or named where they drive
+// the same bodies (AddOrder).
+enum class Own { kJoint, kPath };
+std::string OtherJump(const Model<double>& model, double time, double near, Own kind,
                       const std::string& own) {
   for (const LoadJump& jump : LoadJumpsWithin(model, time - near, time + near)) {
-    if (jump.what != own) return jump.what;
+    if (jump.what != own && (kind != Own::kPath || jump.driven < 0)) return jump.what;
   }
   return "";
 }
@@ -108,7 +111,8 @@ void RolloutCertifier::AddReleases(const Model<double>& model) {
       OneSided(which + " s is the end of the run");
     } else if (IsReadAt(*model.structure, time)) {
       OneSided(which + kIsRead);
-    } else if (const std::string other = OtherJump(model, time, near, "joint " + joint.name);
+    } else if (const std::string other =
+                   OtherJump(model, time, near, Own::kJoint, "joint " + joint.name);
                !other.empty()) {
       OneSided(WhereItSteps(which, other));
     }
@@ -188,7 +192,7 @@ void RolloutCertifier::AddPaths(const Model<double>& model) {
                  IsSameInstant(s, time, StepTime(s.settings, step))) {
         OneSided(which + " s is on a step's boundary");
       } else if (s.settings.stepping == Stepping::kEvent) {
-        const std::string other = OtherJump(model, time, kSameInstant * s.settings.dt,
+        const std::string other = OtherJump(model, time, kSameInstant * s.settings.dt, Own::kPath,
                                             "the speed of body " + s.bodies[index.body].name);
         if (!other.empty()) OneSided(WhereItSteps(which, other));
       }

@@ -62,7 +62,16 @@ std::shared_ptr<const ModelStructure> Longer(
     const std::shared_ptr<const ModelStructure>& structure) {
   if (structure->settings.stepping == Stepping::kFixed) return structure;
   auto longer = std::make_shared<ModelStructure>(*structure);
-  longer->settings.duration += kBehindEnd * structure->settings.duration;
+  SimulationSettings& settings = longer->settings;
+  const double end = settings.duration;
+  settings.duration += kBehindEnd * end;
+  if (!settings.step_times.empty()) {
+    const auto steps = static_cast<long>(std::ceil(kBehindEnd * end / settings.dt));
+    for (long k = 1; k < steps; ++k) {
+      settings.step_times.push_back(end + static_cast<double>(k) * settings.dt);
+    }
+    settings.step_times.push_back(settings.duration);
+  }
   return longer;
 }
 

@@ -21,14 +21,16 @@ double NearAStepsEnd(const Model<double>& model) {
 // Calls visit(edge) for the knots of paths within [from, to].
 template <typename Visit>
 void ForEachKnot(const Model<double>& model, double from, double to, const Visit& visit) {
-  for (const PathIndex& index : model.structure->paths) {
+  const std::vector<PathIndex>& paths = model.structure->paths;
+  for (const PathIndex& index : paths) {
     const int number = index.numbers + kPathDelay;
+    const int path = static_cast<int>(&index - paths.data());
     const double delay = model.parameters[number];
     const std::vector<double>& times = index.path->times();
     auto knot = std::lower_bound(times.begin(), times.end(), from - delay);
     for (; knot != times.end() && *knot + delay <= to; ++knot) {
       const bool jumps = index.path->JumpsAt(static_cast<int>(knot - times.begin()));
-      visit(Edge{*knot + delay, WindowEdge{number}, !jumps});
+      visit(Edge{*knot + delay, WindowEdge{number, -1, 0.0, jumps ? path : -1}, !jumps});
     }
   }
 }
@@ -109,6 +111,13 @@ void EdgeGroup::Add(const Edge& edge) {
   any = true;
   steps = steps || edge.steps;
   if (edge.window.number < 0) return;
+  if (edge.window.path >= 0) {
+    const auto place =
+        std::lower_bound(paths.begin(), paths.end(), edge.window.path,
+                         [](const WindowEdge& one, int path) { return one.path < path; });
+    if (place == paths.end() || place->path != edge.window.path) paths.insert(place, edge.window);
+    return;
+  }
   if (window.number < 0 || (gives_way && !edge.gives_way)) {
     window = edge.window;
     gives_way = edge.gives_way;
@@ -117,7 +126,14 @@ void EdgeGroup::Add(const Edge& edge) {
   }
 }
 
-void EdgeGroup::PutStepsFirst() {
+void EdgeGroup::PutInOrder() {
+  if ((window.number < 0 || gives_way) && !paths.empty()) {
+    window = paths.front();
+    gives_way = false;
+    paths.erase(paths.begin());
+  } else {
+    paths.clear();
+  }
   if (!steps || window.number < 0) return;
   if (gives_way) window = WindowEdge();
   if (window.force < 0) return;
@@ -125,14 +141,25 @@ void EdgeGroup::PutStepsFirst() {
   window = WindowEdge();
 }
 
-EdgeGroup NextEdges(const std::vector<Edge>& edges, double now, double rounding) {
+EdgeGroup EdgeGroup::Rest() const {
+  EdgeGroup rest;
+  if (paths.empty()) return rest;
+  rest.any = rest.follows = true;
+  rest.time = time;
+  rest.window = paths.front();
+  rest.gives_way = false;
+  rest.paths.assign(paths.begin() + 1, paths.end());
+  return rest;
+}
+
+EdgeGroup NextEdges(const std::vector<Edge>& edges, double now, double rounding, double width) {
   EdgeGroup group;
   for (const Edge& edge : edges) {
     if (!(edge.time > now + rounding)) continue;
-    if (group.any && edge.time > group.time + rounding) break;
+    if (group.any && edge.time > group.time + std::max(rounding, width)) break;
     group.Add(edge);
   }
-  group.PutStepsFirst();
+  group.PutInOrder();
   return group;
 }
 
@@ -148,13 +175,14 @@ EdgeGroup EdgesAt(const Model<double>& model, double time) {
     ForEachCorner(s, [&](const Signal& signal, size_t k) {
       group.steps = group.steps || (std::abs(signal.time[k] - time) <= near && JumpsAt(signal, k));
     });
-    group.PutStepsFirst();
   }
-  if (s.paths.empty()) return group;
-  ForEachKnot(model, BesideInstant(s, time, PathSide::kBefore),
-              BesideInstant(s, time, PathSide::kAfter), [&](const Edge& edge) {
-                if (!edge.gives_way && IsSameInstant(s, edge.time, time)) group.Add(edge);
-              });
+  if (!s.paths.empty()) {
+    ForEachKnot(model, BesideInstant(s, time, PathSide::kBefore),
+                BesideInstant(s, time, PathSide::kAfter), [&](const Edge& edge) {
+                  if (!edge.gives_way && IsSameInstant(s, edge.time, time)) group.Add(edge);
+                });
+  }
+  group.PutInOrder();
   return group;
 }
 
@@ -268,9 +296,44 @@ double JustAfter(const Model<double>& model, double t) {
   return s.paths.empty() ? after : std::max(after, BesideInstant(s, t, PathSide::kAfter));
 }
 
-std::string CoincidingEdges(const Model<double>& model, const RowMatrixXd& directions) {
+namespace {
+
+// Whether the directions vary the time of an edge, or those of both edges alike.
+bool Varies(const ModelStructure& s, const RowMatrixXd& directions, int number) {
+  return !directions.row(s.ParameterVariable(number)).isZero(0.0);
+}
+bool VaryAlike(const ModelStructure& s, const RowMatrixXd& directions, int number, int other) {
+  return directions.row(s.ParameterVariable(number)) == directions.row(s.ParameterVariable(other));
+}
+
+std::string NameOfEdge(const ModelStructure& s, const WindowEdge& window) {
+  if (window.force >= 0) return "the window of force " + s.forces[window.force].name;
+  for (const JointIndex& joint : s.joints) {
+    if (joint.until == window.number) return "the end of joint " + joint.name;
+  }
+  const auto index = std::find_if(s.paths.begin(), s.paths.end(), [&](const PathIndex& path) {
+    return path.numbers == window.number - kPathDelay;
+  });
+  return "the speed of body " + s.bodies[index->body].name;
+}
+
+std::string CoincideAt(const ModelStructure& s, const WindowEdge& a, const WindowEdge& b,
+                       double time) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%.9g", time);
+  return "expected jumps of paths and ends of joints at times of their own where their "
+         "derivatives are asked for, got " +
+         NameOfEdge(s, a) + " and " + NameOfEdge(s, b) + ", which both change at t = " + text +
+         " s: the derivative depends on their order (set one a little apart)";
+}
+
+// Calls visit(a, b) for edges at one instant, one behind the other, not both of which are knots at
+// which nothing jumps, and whose times do not vary alike; until it returns false.
+template <typename Visit>
+void ForEachCoincidence(const Model<double>& model, const RowMatrixXd& directions,
+                        const Visit& visit) {
   const ModelStructure& s = *model.structure;
-  if ((s.paths.empty() && !s.has_releases) || s.settings.stepping == Stepping::kFixed) return "";
+  if ((s.paths.empty() && !s.has_releases) || s.settings.stepping == Stepping::kFixed) return;
   std::vector<Edge> edges;
   ForEachKnot(model, 0.0, s.settings.duration, [&](const Edge& edge) {
     if (!edge.gives_way) edges.push_back(edge);
@@ -280,35 +343,56 @@ std::string CoincidingEdges(const Model<double>& model, const RowMatrixXd& direc
   });
   std::sort(edges.begin(), edges.end(),
             [](const Edge& x, const Edge& y) { return x.time < y.time; });
-  const auto row = [&](const Edge& edge) {
-    return directions.row(s.ParameterVariable(edge.window.number));
-  };
-  const auto varies = [&](const Edge& edge) { return !row(edge).isZero(0.0); };
   for (size_t i = 1; i < edges.size(); ++i) {
     const Edge& a = edges[i - 1];
     const Edge& b = edges[i];
     if (a.window.number == b.window.number || !IsSameInstant(s, a.time, b.time)) continue;
     if (a.window.force >= 0 && b.window.force >= 0) continue;
-    if (a.time <= 0.0 || (!varies(a) && !varies(b))) continue;
-    if (row(a) == row(b) && IsRelease(s, a) && IsRelease(s, b)) continue;  // they vary alike
-    const auto name = [&](const Edge& edge) {
-      if (edge.window.force >= 0) return "the window of force " + s.forces[edge.window.force].name;
-      for (const JointIndex& joint : s.joints) {
-        if (joint.until == edge.window.number) return "the end of joint " + joint.name;
-      }
-      const auto index = std::find_if(s.paths.begin(), s.paths.end(), [&](const PathIndex& path) {
-        return path.numbers == edge.window.number - kPathDelay;
-      });
-      return "the speed of body " + s.bodies[index->body].name;
-    };
-    char time[40];
-    std::snprintf(time, sizeof time, "%.9g", b.time);
-    return "expected jumps of paths and ends of joints at times of their own where their "
-           "derivatives are asked for, got " +
-           name(a) + " and " + name(b) + ", which both change at t = " + time +
-           " s: the derivative depends on their order (set one a little apart)";
+    if (a.time <= 0.0) continue;
+    if (!Varies(s, directions, a.window.number) && !Varies(s, directions, b.window.number))
+      continue;
+    if (!visit(a, b)) return;
   }
-  return "";
+}
+
+}  // namespace
+
+std::string CoincidingEdges(const Model<double>& model, const RowMatrixXd& directions) {
+  const ModelStructure& s = *model.structure;
+  std::string message;
+  ForEachCoincidence(model, directions, [&](const Edge& a, const Edge& b) {
+    if (a.window.path >= 0 && b.window.path >= 0) return true;
+    const bool alike = VaryAlike(s, directions, a.window.number, b.window.number);
+    if (alike && IsRelease(s, a) && IsRelease(s, b)) return true;
+    message = CoincideAt(s, a.window, b.window, b.time);
+    return false;
+  });
+  return message;
+}
+
+bool IsPathsDelay(const ModelStructure& structure, int number) {
+  return std::any_of(structure.paths.begin(), structure.paths.end(),
+                     [&](const PathIndex& index) { return index.numbers + kPathDelay == number; });
+}
+
+bool HasCoincidingPaths(const Model<double>& model, const RowMatrixXd& directions) {
+  bool has = false;
+  ForEachCoincidence(model, directions, [&](const Edge& a, const Edge& b) {
+    has = a.window.path >= 0 && b.window.path >= 0 &&
+          !VaryAlike(*model.structure, directions, a.window.number, b.window.number);
+    return !has;
+  });
+  return has;
+}
+
+std::string CoupledPaths(const Model<double>& model, const RowMatrixXd& directions, int number,
+                         int other, double time) {
+  const ModelStructure& s = *model.structure;
+  if (!IsPathsDelay(s, number) || !IsPathsDelay(s, other) ||
+      VaryAlike(s, directions, number, other)) {
+    return "";
+  }
+  return CoincideAt(s, WindowEdge{number}, WindowEdge{other}, time);
 }
 
 void AddEdgesToCome(const Model<double>& model, const Segment& segment,

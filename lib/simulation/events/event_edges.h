@@ -24,9 +24,12 @@
 //
 // A knot of a path is an edge at knot + delay. Where the rate jumps there (driven_bodies.h) the
 // bodies that touch the driven one, or are joined to it, meet its new twist by an impact as soon as
-// the edge has been reached: the jump itself has no impulse. At the other knots of a cubic path
-// nothing jumps but the third derivative; they are edges for the sake of the integrators' order,
-// and give way to others at their instant.
+// the edge has been reached: the jump itself has no impulse. Knots of several bodies' paths at one
+// instant, as in recordings of one camera, are passed one after another, each with the impulses
+// that follow it; where they drive the same bodies all are passed at once, and derivatives by their
+// delays apart are refused (CoupledPaths). At the other knots of a cubic path nothing jumps but the
+// third derivative; they are edges for the sake of the integrators' order, and give way to others
+// at their instant.
 
 #include <string>
 #include <vector>
@@ -54,15 +57,24 @@ struct EdgeGroup {
   std::vector<WindowEdge> further;
   bool gives_way = true;  ///< whether `window` is a knot at which no rate jumps
   bool steps = false;     ///< whether a signal's value jumps
+  /// Knots of further paths at which a rate jumps, in the order of the paths. Empty beside a
+  /// force's window or a joint's end, with which all paths go on.
+  std::vector<WindowEdge> paths;
+  bool follows = false;  ///< others at its instant have been passed
 
   void Add(const Edge& edge);
-  /// Where a signal's value jumps beside a window's edge, that given time comes first: it must not
-  /// move with the window's. A knot at which nothing jumps is left out there.
-  void PutStepsFirst();
+  /// Puts the edges of an instant in their order. Where a signal's value jumps beside a window's
+  /// edge, that given time comes first: it must not move with the window's. A knot at which nothing
+  /// jumps is left out there.
+  void PutInOrder();
+  /// What is left behind the first path's knot.
+  EdgeGroup Rest() const;
 };
 
-/// The first edge after `now` of a sorted list, with those at its instant.
-EdgeGroup NextEdges(const std::vector<Edge>& edges, double now, double rounding);
+/// The first edge after `now` of a sorted list, with those at its instant, which are no farther
+/// apart than `rounding` or, if that is more, `width`.
+EdgeGroup NextEdges(const std::vector<Edge>& edges, double now, double rounding,
+                    double width = 0.0);
 
 /// The edges of windows and the knots at which a rate jumps, on a boundary of steps at `time`.
 EdgeGroup EdgesAt(const Model<double>& model, double time);
@@ -101,7 +113,17 @@ double JustAfter(const Model<double>& model, double t);
 
 /// Empty, or why derivatives along these directions (num_variables x columns) are refused: the time
 /// of a jump of a path's rate or of a joint's end and another edge's are the same, though both vary
-/// by numbers of their own, and what follows depends on their order. Empty for fixed steps.
+/// by numbers of their own, and what follows depends on their order. Empty for fixed steps, and of
+/// two paths.
 std::string CoincidingEdges(const Model<double>& model, const RowMatrixXd& directions);
+
+/// Whether a number of the model is the delay of a path.
+bool IsPathsDelay(const ModelStructure& structure, int number);
+/// Whether the rates of two paths jump at one instant of the run, whose delays vary apart.
+bool HasCoincidingPaths(const Model<double>& model, const RowMatrixXd& directions);
+/// Empty, or why derivatives along these directions are refused: the delays `number` and `other` of
+/// two paths, which jump at `time` (s) and drive the same bodies, vary apart.
+std::string CoupledPaths(const Model<double>& model, const RowMatrixXd& directions, int number,
+                         int other, double time);
 
 }  // namespace tangible

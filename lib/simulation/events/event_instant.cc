@@ -115,7 +115,8 @@ bool EventStepper::AddInstant(const Model<double>& model, double t, EventKind ki
   segment.starts = guess_.starts;
   // A window is closed from its end on, not at it.
   const bool has_edge = !model.structure->paths.empty() || EdgesAt(model, t).any;
-  segment.middle = !is_after_edges ? JustBefore(model, t) : has_edge ? JustAfter(model, t) : t;
+  const double after = due_.follows ? inside_ : has_edge ? JustAfter(model, t) : t;
+  segment.middle = is_after_edges ? after : JustBefore(model, t);
   segment.before = *state;
   segment.event_number = -1;
   segment.at_once = false;
@@ -146,10 +147,51 @@ bool EventStepper::AddInstant(const Model<double>& model, double t, EventKind ki
   return true;
 }
 
-bool EventStepper::FollowAfter(const Model<double>& model, double now, State<double>* state,
-                               StepReport* outcome) {
-  if (model.structure->paths.empty()) return true;
-  inside_ = JustAfter(model, now);
+EdgeGroup EventStepper::LeftOf(const Model<double>& model, const EdgeGroup& passed,
+                               const State<double>& state) {
+  const ModelStructure& s = *model.structure;
+  EdgeGroup rest = passed.Rest();
+  if (!rest.any) return rest;
+  FindTouching(model, state);
+  CoupledBodies coupled;
+  coupled.Connect(s, touching_.contacts);
+  std::vector<WindowEdge> paths = rest.paths;
+  paths.insert(paths.begin(), {passed.window, rest.window});
+  std::vector<int> driver(s.bodies.size(), -1);  // of a group of bodies
+  for (const WindowEdge& edge : paths) {
+    const int body = s.paths[edge.path].body;
+    const auto drives = [&](int a, int b) {
+      const int group = a == body ? coupled.GroupOf(b) : b == body ? coupled.GroupOf(a) : -1;
+      if (group < 0) return false;
+      if (driver[group] >= 0 && driver[group] != edge.number) return true;
+      driver[group] = edge.number;
+      return false;
+    };
+    const auto meets = [&](const auto& all) {
+      return std::any_of(all.begin(), all.end(),
+                         [&](const auto& one) { return drives(one.a, one.b); });
+    };
+    if (!meets(touching_.contacts) && !meets(s.joints)) continue;
+    for (int p = record_.num_parts - 1; p >= 0; --p) {
+      Segment& segment = record_.parts[p]->segment;
+      if (record_.parts[p]->is_impulses) continue;
+      if (segment.event == EventKind::kEdge) {
+        segment.edge_before =
+            edge.number != segment.event_number ? edge.number : rest.window.number;
+      }
+      break;
+    }
+    return EdgeGroup();
+  }
+  return rest;
+}
+
+bool EventStepper::FollowAfter(const Model<double>& model, double now, const EdgeGroup& passed,
+                               State<double>* state, StepReport* outcome) {
+  const ModelStructure& s = *model.structure;
+  if (s.paths.empty()) return true;
+  due_ = LeftOf(model, passed, *state);
+  inside_ = due_.any ? BehindPath(s, now, due_.window.path - 1) : JustAfter(model, now);
   FollowPaths(model, now, inside_, state);
   if (guess_.starts || !JumpPullsJoint(model, now)) return true;
   // Joints follow a jump by the impulse that restores them; contacts that it makes approach have an
@@ -255,10 +297,12 @@ Segment* EventStepper::AddEdge(const Model<double>& model, double t, double midd
   return &segment;
 }
 
-void EventStepper::AddEdgesAtStart(const Model<double>& model, double t, const State<double>& state,
-                                   StepReport* outcome) {
-  if (guess_.starts) return;  // there is no motion before
-  AddEdgesHere(model, t, EdgesAt(model, t), state, outcome);
+EdgeGroup EventStepper::AddEdgesAtStart(const Model<double>& model, double t,
+                                        const State<double>& state, StepReport* outcome) {
+  if (guess_.starts) return {};  // there is no motion before
+  EdgeGroup edges = EdgesAt(model, t);
+  AddEdgesHere(model, t, edges, state, outcome);
+  return edges;
 }
 
 bool EventStepper::PassEdges(const Model<double>& model, double t, const EdgeGroup& edges,
@@ -266,14 +310,14 @@ bool EventStepper::PassEdges(const Model<double>& model, double t, const EdgeGro
   AddEdgesHere(model, t, edges, *state, outcome);
   ++outcome->events;
   SetReleased(model, JustAfter(model, t), state);
-  return FollowAfter(model, t, state, outcome);
+  return FollowAfter(model, t, edges, state, outcome);
 }
 
 void EventStepper::AddEdgesHere(const Model<double>& model, double t, const EdgeGroup& edges,
                                 const State<double>& state, StepReport* outcome) {
   if (!edges.any) return;
-  Segment* segment =
-      AddEdge(model, t, JustBefore(model, std::min(edges.time, t)), {}, state, outcome);
+  const double middle = edges.follows ? inside_ : JustBefore(model, std::min(edges.time, t));
+  Segment* segment = AddEdge(model, t, middle, {}, state, outcome);
   if (segment == nullptr) return;
   segment->event_number = edges.window.number;
   AddFurtherEdges(model, t, edges, state, outcome);

@@ -79,6 +79,7 @@ struct WindowEdge {
   int number = -1;
   int force = -1;     ///< −1: of a joint, or of a path, whose time is the knot's and the number
   double side = 0.0;  ///< −1: the window opens there, 1: it closes
+  int path = -1;      ///< of a knot at which the path's rate jumps
 };
 
 /// How a contact goes as several let go together: the rates at which it opens and slides, as shares
@@ -98,7 +99,8 @@ struct Segment {
   /// Of a segment of zero length between edges of windows at one instant: the edges that are still
   /// to come, of which the first ends it (event_edges.h).
   std::vector<WindowEdge> further_edges;
-  /// The number of the edge at its start, where the order of the two edges matters; otherwise −1.
+  /// The number of the edge at its start, or of another one at its end, where the order of the two
+  /// edges matters; otherwise −1.
   int edge_before = -1;
   State<double> before, after;
   std::vector<ActiveContact> contacts;  ///< those closed; law kRecovery: pushed out of penetration

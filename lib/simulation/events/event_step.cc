@@ -704,6 +704,7 @@ void EventStepper::BeginStep(const Model<double>& model, double t, double h,
                              const State<double>& state) {
   record_.Clear();
   guess_.located = 0;
+  due_ = EdgeGroup();
   released_.clear();
   resting_.clear();
   jammed_.clear();
@@ -722,7 +723,7 @@ StepReport EventStepper::Advance(const Model<double>& model, double t, double h,
                                  State<double>* state) {
   StepReport outcome;
   BeginStep(model, t, h, *state);
-  AddEdgesAtStart(model, t, *state, &outcome);
+  const EdgeGroup at_start = AddEdgesAtStart(model, t, *state, &outcome);
   SetReleased(model, JustAfter(model, t), state);
   const std::vector<Edge> edges = EdgesWithin(model, t, t + h);
   const double end = t + h;
@@ -735,8 +736,7 @@ StepReport EventStepper::Advance(const Model<double>& model, double t, double h,
   bool at_given_time = true;
   bool begins = true;
   int num_motions = 0;
-  EdgeGroup due;  // at the instant of the event that has ended the last motion
-  if (!FollowAfter(model, t, state, &outcome)) return fail();
+  if (!FollowAfter(model, t, at_start, state, &outcome)) return fail();
   while (end - now > kTimeRounding * h || !at_given_time) {
     const bool at_end = end - now <= kTimeRounding * h;
     if (!SolveInstantOrBehind(model, now, h, std::exchange(begins, false), at_end, state,
@@ -744,11 +744,12 @@ StepReport EventStepper::Advance(const Model<double>& model, double t, double h,
       return fail();
     }
     if (at_end) break;
-    if (const EdgeGroup passed = std::exchange(due, EdgeGroup()); passed.any) {
+    if (const EdgeGroup passed = std::exchange(due_, EdgeGroup()); passed.any) {
       if (!PassEdges(model, now, passed, state, &outcome)) return fail();
       continue;
     }
-    const EdgeGroup next = NextEdges(edges, now, kTimeRounding * h);
+    const EdgeGroup next =
+        NextEdges(edges, now, kTimeRounding * h, InstantWidth(*model.structure, now));
     const double goal = next.any ? next.time : end;
     const double until = now + std::ldexp(goal - now, -tries.halvings);
     TurnOntoEdges(model, now, *state, &outcome);
@@ -783,11 +784,11 @@ StepReport EventStepper::Advance(const Model<double>& model, double t, double h,
       }
       AddFurtherEdges(model, now, next, *state, &outcome);
       if (next.any) SetReleased(model, JustAfter(model, now), state);
-      if (next.any && !FollowAfter(model, now, state, &outcome)) return fail();
+      if (next.any && !FollowAfter(model, now, next, state, &outcome)) return fail();
       continue;
     }
     now += segment.length;
-    if (next.any && next.time <= now + kTimeRounding * h) due = next;
+    if (next.any && next.time <= now + kTimeRounding * h) due_ = next;
     tries.halved_motions = 0;
     if (!TakeEvent(model, now, h, segment, state, &outcome)) {
       return fail();

@@ -147,10 +147,14 @@ class EventStepper {
                     State<double>* state, StepReport* outcome);
   bool SolveInstantOrBehind(const Model<double>& model, double now, double h, bool begins,
                             bool at_end, State<double>* state, StepReport* outcome);
-  /// At a step's start and past an edge: puts driven bodies on the side after it, and takes the
-  /// bodies that joints hold to them along.
-  bool FollowAfter(const Model<double>& model, double now, State<double>* state,
-                   StepReport* outcome);
+  /// At a step's start and past edges, which `passed` lists: puts driven bodies on the side after
+  /// them, and takes the bodies that joints hold to them along. Knots of further paths are due
+  /// then.
+  bool FollowAfter(const Model<double>& model, double now, const EdgeGroup& passed,
+                   State<double>* state, StepReport* outcome);
+  /// What is left of edges behind the first one: the knots of further paths, unless some of all
+  /// these bodies drive the same ones, which meet all of their new twists at once.
+  EdgeGroup LeftOf(const Model<double>& model, const EdgeGroup& passed, const State<double>& state);
   /// Twists that the joints allow, by an impulse as a new part of the record.
   bool ProjectOntoJoints(const Model<double>& model, double now, State<double>* state);
   /// At a run's start: where the initial twists turn a joint with friction alone by the joints'
@@ -201,9 +205,9 @@ class EventStepper {
   Segment* AddEdge(const Model<double>& model, double t, double middle,
                    std::vector<WindowEdge> to_come, const State<double>& given,
                    StepReport* outcome);
-  /// Those for edges of windows on the step's start.
-  void AddEdgesAtStart(const Model<double>& model, double t, const State<double>& state,
-                       StepReport* outcome);
+  /// Those for edges of windows on the step's start, which it returns.
+  EdgeGroup AddEdgesAtStart(const Model<double>& model, double t, const State<double>& state,
+                            StepReport* outcome);
   /// Those for a group of edges at t.
   void AddEdgesHere(const Model<double>& model, double t, const EdgeGroup& edges,
                     const State<double>& state, StepReport* outcome);
@@ -281,6 +285,7 @@ class EventStepper {
   InnerImpulses inner_impulses_;
   EventRecord record_;
   double inside_ = 0.0;  ///< the time that tells the pieces on which paths are followed
+  EdgeGroup due_;        ///< at the instant of the last event or edge
   AssemblyScratch<double> assembly_;
   State<double> before_edge_;  ///< with the joints that end at the edge
   Touching touching_;

@@ -23,10 +23,9 @@ void LinearisedFriction(const double about[2], const double velocity[2], double 
 
 }  // namespace
 
-void SupportIteration::Start(const Model<double>& model, double h,
-                             const ContactProblem<double>& problem, const std::vector<int>& sought,
-                             State<double>* before) {
-  const ModelStructure& s = *model.structure;
+void SupportIteration::StartAt(const Model<double>& model, double h, const std::vector<int>& sought,
+                               const State<double>& before) {
+  const size_t supports = model.structure->supports.size();
   h_ = h;
   iterations_ = 0;
   residual_ = before_dampers_ = HUGE_VAL;
@@ -35,34 +34,44 @@ void SupportIteration::Start(const Model<double>& model, double h,
   newton_left_ = kNewton;
   dampers_left_ = 0;
   dampers_ = kDampers;
-  before->supports.resize(s.supports.size());
-  residuals_.resize(s.supports.size());
-  turns_.assign(s.supports.size(), 0);
-  shares_.assign(s.supports.size(), SupportState::kNothing);
-  damped_.resize(s.supports.size());
+  residuals_.resize(supports);
+  turns_.assign(supports, 0);
+  shares_.assign(supports, SupportState::kNothing);
+  damped_.resize(supports);
   sought_ = sought;
+  horizons_.resize(supports);
+  for (size_t k = 0; k < supports; ++k) horizons_[k] = before.supports[k].horizon;
+}
+
+void SupportIteration::Start(const Model<double>& model, double h,
+                             const ContactProblem<double>& problem, const std::vector<int>& sought,
+                             State<double>* before) {
+  const ModelStructure& s = *model.structure;
+  before->supports.resize(s.supports.size());
+  StartAt(model, h, sought, *before);
   for (size_t k = 0; k < s.supports.size(); ++k) {
     if (PartOf(k) == SupportState::kNothing) continue;
     const size_t row = 3 * static_cast<size_t>(s.bodies[s.supports[k].body].block);
-    double shift[2];
+    double shift[3];
     Set(model, *before, k, shift);
     double momentum[3];
     std::copy_n(&problem.load[row], 3, momentum);
-    for (int i = 0; i < 2; ++i) momentum[i] += problem.mass[row + i] * shift[i];
+    for (int i = 0; i < 3; ++i) momentum[i] += problem.mass[row + i] * shift[i];
     before->supports[k] = OfBody(k, friction_.SolveAlone(&problem.mass[row], momentum));
   }
 }
 
 void SupportIteration::Set(const Model<double>& model, const State<double>& before, size_t k,
-                           double shift[2]) {
+                           double shift[3]) {
   const SupportIndex& support = model.structure->supports[k];
   friction_.Set(model, before, support, h_);
-  shift[0] = shift[1] = 0.0;
+  const double* const twist = &before.twist[3 * static_cast<size_t>(support.body)];
+  for (int i = 0; i < 3; ++i) shift[i] = horizons_[k] > 0.0 ? twist[i] / horizons_[k] : 0.0;
   const int part = PartOf(k);
   if (part < 0) return;
   friction_.KeepPoint(part);
-  const double turn = before.twist[3 * static_cast<size_t>(support.body) + 2];
-  for (int i = 0; i < 2; ++i) shift[i] = -turn * turn * friction_.points()[0].arm[i];
+  const double turn = twist[2];
+  for (int i = 0; i < 2; ++i) shift[i] -= turn * turn * friction_.points()[0].arm[i];
 }
 
 SupportState SupportIteration::OfPart(size_t k, const SupportState& at) const {
@@ -73,6 +82,7 @@ SupportState SupportIteration::OfPart(size_t k, const SupportState& at) const {
 
 SupportState SupportIteration::OfBody(size_t k, const SupportState& at) const {
   SupportState whole = at;
+  whole.horizon = horizons_[k];
   if (PartOf(k) < 0) return whole;
   whole.holds = at.holds == SupportState::kNothing ? at.holds : PartOf(k);
   whole.slow = PartOf(k);
@@ -289,10 +299,10 @@ void SupportIteration::ForEach(const Model<double>& model, const ContactProblem<
   for (size_t k = 0; k < s.supports.size(); ++k) {
     if (PartOf(k) == SupportState::kNothing) continue;
     const size_t row = 3 * static_cast<size_t>(s.bodies[s.supports[k].body].block);
-    double shift[2];
+    double shift[3];
     Set(model, *before, k, shift);
     const double twist[3] = {solution.motion[row] + shift[0], solution.motion[row + 1] + shift[1],
-                             solution.motion[row + 2]};
+                             solution.motion[row + 2] + shift[2]};
     SupportState at = OfPart(k, before->supports[k]);
     visit(k, &problem.mass[row], twist, &solution.joint_impulse[3 * (s.joints.size() + k)], &at);
     before->supports[k] = OfBody(k, at);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// The supports of a fixed step, or of bodies that a motion between events finds at rest
-// (dynamics/elements/support.h): the contact problem of a step, or of accelerations, has
+// The supports of a fixed step, or of bodies that a motion between events finds at rest, or
+// creeping (dynamics/elements/support.h): the contact problem of a step, or of accelerations, has
 // their friction linearised about a twist û and the points that they hold as rows, and is solved
 // again until
 //
@@ -37,9 +37,13 @@ class SupportIteration {
  public:
   /// Chooses what the supports do in a step of length h. `problem` has been assembled without them.
   /// `sought`: empty, or which supports count, by SupportState::Holds; of accelerations (h = 1)
-  /// those of bodies at rest, or a point at rest, whose accelerations stand for the new twists.
+  /// those of bodies at rest, or a point at rest, whose accelerations stand for the new twists; of
+  /// those that creep a + v / τ does (SupportState::horizon, which `before` gives).
   void Start(const Model<double>& model, double h, const ContactProblem<double>& problem,
              const std::vector<int>& sought, State<double>* before);
+  /// The same from what `before` says that they do, which is near the solution.
+  void StartAt(const Model<double>& model, double h, const std::vector<int>& sought,
+               const State<double>& before);
   /// Whether the friction of a solved step is that of its new twists, to the tolerance of the LCP,
   /// and linearised about them; if it is not, linearises it anew in `before`, which is the state of
   /// the record. Where the friction keeps its direction it is right at once, but its derivative
@@ -86,8 +90,8 @@ class SupportIteration {
                 SupportState* at) const;
   int PartOf(size_t k) const { return sought_.empty() ? SupportState::kBody : sought_[k]; }
   /// Takes the friction of what is sought of a support, and what turns its twist into that of
-  /// friction, m/s or m/s².
-  void Set(const Model<double>& model, const State<double>& before, size_t k, double shift[2]);
+  /// friction, m/s or m/s² (rad/s, rad/s²).
+  void Set(const Model<double>& model, const State<double>& before, size_t k, double shift[3]);
   SupportState OfPart(size_t k, const SupportState& at) const;
   SupportState OfBody(size_t k, const SupportState& at) const;
   /// Visits what is sought: `at`, `twist` and `held` are of a support of that part alone.
@@ -119,6 +123,7 @@ class SupportIteration {
   SupportFriction friction_;
   std::vector<double> residuals_;
   std::vector<int> sought_;
+  std::vector<double> horizons_;               ///< SupportState::horizon of each support
   std::vector<std::array<double, 3>> damped_;  ///< twists at the end of the last round of dampers
   std::vector<double> ratios_, last_ratios_;   ///< of the parts of all supports
   std::vector<int> shares_;  ///< what the dampers have found held, within the limit

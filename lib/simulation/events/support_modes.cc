@@ -185,6 +185,8 @@ void SupportModes::Begin(const Model<double>& model, double slow, Segment* segme
   sought_.assign(s.supports.size(), SupportState::kNothing);
   turns_.assign(s.supports.size(), 0);
   turned_.assign(s.supports.size(), 0);
+  horizons_.assign(s.supports.size(), 0.0);
+  may_creep_ = true;
   changes_ = 0;
   times_let_go_ = 0;
   unsettled_ = -1;
@@ -210,6 +212,7 @@ void SupportModes::GoOn(const Model<double>& model, int k, State<double>* before
   friction_.Set(model, *before, support, 1.0);
   const double unit =
       friction_.limit() / model.parameters[model.structure->bodies[support.body].mass] * dt_;
+  horizons_[k] = 0.0;
   SupportState& at = before->supports[k];
   at = SupportState();
   std::copy_n(twist, 3, at.twist.begin());
@@ -247,9 +250,11 @@ bool SupportModes::GoOnInstead(const Model<double>& model, State<double>* before
   bool any = false;
   if (changes_ <= kMostOfSlow) return any;
   for (int k = 0; k < static_cast<int>(before->supports.size()); ++k) {
-    if (!HasBegun(k)) continue;
+    const bool creeps = courses_[k] == Course::kCreeps && changes_ > kMostOfCreeping;
+    if (!HasBegun(k) && !creeps) continue;
     GoOn(model, k, before);
     any = true;
+    may_creep_ = may_creep_ && !creeps;
   }
   if (any) changes_ = 0;
   return any;
@@ -262,6 +267,7 @@ void SupportModes::Seek(int k, int part, SupportState* at) {
   *at = SupportState();
   at->slow = part;
   at->is_sought = true;
+  at->horizon = horizons_[k];
 }
 
 long SupportModes::NumSought() const {
@@ -271,6 +277,81 @@ long SupportModes::NumSought() const {
 
 bool SupportModes::Accept(const Model<double>& model, const ContactProblem<double>& problem,
                           const ContactSolution<double>& solution, Segment* segment) {
+  return AcceptAll(model, problem, solution, segment) && !FindCreeping(model, solution, segment);
+}
+
+bool SupportModes::FindCreeping(const Model<double>& model, const ContactSolution<double>& solution,
+                                Segment* segment) {
+  const ModelStructure& s = *model.structure;
+  if (!may_creep_ || (s.joints.empty() && segment->contacts.empty())) return false;
+  bool any = false;
+  for (int k = 0; k < static_cast<int>(s.supports.size()); ++k) {
+    if (courses_[k] != Course::kSlides) continue;
+    friction_.Set(model, segment->before, s.supports[k], 1.0);
+    const BodyIndex& body = s.bodies[s.supports[k].body];
+    const double unit = friction_.limit() / model.parameters[body.mass];
+    const double* acceleration = NumbersOfBlock(model, k, solution.motion);
+    if (speeds_[k] > kCreepingSpeed * unit * dt_ ||
+        SpeedOfPart(friction_, SupportState::kBody, acceleration) > kCreeping * unit) {
+      continue;
+    }
+    const double* twist = &segment->before.twist[3 * static_cast<size_t>(s.supports[k].body)];
+    const double loss = -GainOfPart(friction_, SupportState::kBody, twist, acceleration);
+    const double square = ProductOf(friction_, twist, twist);
+    // By much less than would stop it; near states have the same.
+    double horizon = kMostHorizon * dt_;
+    while (loss * horizon > kHorizonOfRest * square) horizon *= kShorterHorizon;
+    courses_[k] = Course::kCreeps;
+    horizons_[k] = horizon;
+    SeekCreeping(model, k, acceleration, &segment->before);
+    any = true;
+  }
+  if (any) StartAtGuess(model, segment->before);
+  return any;
+}
+
+void SupportModes::SeekCreeping(const Model<double>& model, int k, const double* acceleration,
+                                State<double>* before) {
+  SupportState& at = before->supports[k];
+  Seek(k, SupportState::kBody, &at);
+  const size_t first = 3 * static_cast<size_t>(model.structure->supports[k].body);
+  for (size_t i = 0; i < 3; ++i) {
+    at.twist[i] = acceleration[i] + before->twist[first + i] / horizons_[k];
+  }
+}
+
+void SupportModes::StartAtGuess(const Model<double>& model, const State<double>& before) {
+  iteration_.StartAt(model, 1.0, sought_, before);
+  started_ = true;
+}
+
+void SupportModes::ShortenHorizon(const Model<double>& model, int k, State<double>* before) {
+  SupportState& at = before->supports[k];
+  horizons_[k] *= kShorterHorizon;
+  if (horizons_[k] > kLeastHorizon * dt_) {
+    constexpr double kNoAcceleration[3] = {0.0, 0.0, 0.0};
+    SeekCreeping(model, k, kNoAcceleration, before);
+    return StartAtGuess(model, *before);
+  }
+  horizons_[k] = 0.0;
+  may_creep_ = false;
+  const SupportIndex& support = model.structure->supports[k];
+  friction_.Set(model, *before, support, 1.0);
+  const BodyIndex& body = model.structure->bodies[support.body];
+  if (speeds_[k] <= kSlowSupport * friction_.limit() / model.parameters[body.mass] * dt_) {
+    courses_[k] = Course::kRests;  // it has hardly begun to move
+    return Seek(k, SupportState::kBody, &at);
+  }
+  at = SupportState();
+  at.slow = SupportState::kBody;
+  std::copy_n(&before->twist[3 * static_cast<size_t>(support.body)], 3, at.twist.begin());
+  courses_[k] = Course::kStops;
+  sought_[k] = SupportState::kNothing;
+  started_ = false;
+}
+
+bool SupportModes::AcceptAll(const Model<double>& model, const ContactProblem<double>& problem,
+                             const ContactSolution<double>& solution, Segment* segment) {
   const ModelStructure& s = *model.structure;
   State<double>& before = segment->before;
   ++changes_;
@@ -308,6 +389,10 @@ bool SupportModes::Accept(const Model<double>& model, const ContactProblem<doubl
       at.is_sought = false;
     }
     if (!settled) unsettled_ = k;
+    if (settled && courses_[k] == Course::kCreeps && at.holds != SupportState::kNothing) {
+      ShortenHorizon(model, k, &before);
+      accepted = false;
+    }
     if (!settled || !HasBegun(k)) continue;
     // What is slow, but does not move along the acceleration that it would have at rest, comes to
     // rest or turns.
@@ -349,6 +434,7 @@ bool SupportModes::HoldSharing(const Model<double>& model, const ContactSolution
   bool any = false;
   for (int k = 0; k < static_cast<int>(s.supports.size()); ++k) {
     if (sought_[k] == SupportState::kNothing || HasBegun(k)) continue;
+    if (courses_[k] == Course::kCreeps) continue;
     friction_.Set(model, segment->before, s.supports[k], 1.0);
     const double unit = friction_.limit() / model.parameters[s.bodies[s.supports[k].body].mass];
     const double* acceleration = NumbersOfBlock(model, k, solution.motion);
@@ -479,7 +565,7 @@ bool SupportModes::HasToStop(const Model<double>& model, const Segment& segment)
 
 bool SupportModes::HoldsStarting(const Segment& segment) const {
   for (size_t k = 0; k < courses_.size(); ++k) {
-    if (courses_[k] == Course::kStarts &&
+    if ((courses_[k] == Course::kStarts || courses_[k] == Course::kCreeps) &&
         segment.before.supports[k].holds != SupportState::kNothing) {
       return true;
     }
@@ -544,6 +630,7 @@ double SupportModes::LongestOf(const Model<double>& model, int k, const Segment&
   friction_.Set(model, segment.before, support, 1.0);
   const double speed = SpeedOfPart(friction_, SupportState::kBody, twist);
   const double size = SpeedOfPart(friction_, SupportState::kBody, acceleration);
+  if (courses_[k] == Course::kCreeps) return horizons_[k];
   if (at.slow == SupportState::kBody) {
     const double least = kFirstOfSupport * dt_;
     if (courses_[k] == Course::kStops) return size > 0.0 ? 4.0 * speed / size : least;

@@ -70,6 +70,7 @@ class SupportModes {
   static constexpr int kMostChanges = 150;
   static constexpr int kMostLetGo = 3;
   static constexpr int kMostOfSlow = 12;  ///< changes where a body is slow, and need not be at rest
+  static constexpr int kMostOfCreeping = 40;  ///< and where one creeps
 
   /// What a support does, and why.
   enum class Course : char {
@@ -82,6 +83,7 @@ class SupportModes {
     kPasses,    ///< a point is slow, and begins to move or only passes a low speed
     kReleased,  ///< an event has let go what was held
     kShares,    ///< the body is at rest, and others share what its support is at its limit for
+    kCreeps,    ///< the body is slow, and hardly changes its speed (SupportState::horizon)
   };
   struct Rested {
     int support = -1;
@@ -105,6 +107,19 @@ class SupportModes {
     return courses_[k] == Course::kStarts || courses_[k] == Course::kPasses;
   }
   bool StartsAlong(const Model<double>& model, int k, const State<double>& before) const;
+  bool AcceptAll(const Model<double>& model, const ContactProblem<double>& problem,
+                 const ContactSolution<double>& solution, Segment* segment);
+  /// Of bodies that joints or contacts connect to others and that slide by their velocities: seeks
+  /// the friction of those that creep. Whether there are any.
+  bool FindCreeping(const Model<double>& model, const ContactSolution<double>& solution,
+                    Segment* segment);
+  /// Seeks it from a guess of its accelerations, 3; then of all that is sought from what is known.
+  void SeekCreeping(const Model<double>& model, int k, const double* acceleration,
+                    State<double>* before);
+  void StartAtGuess(const Model<double>& model, const State<double>& before);
+  /// Friction with which a creeping body has stopped after its horizon: seeks that of a shorter
+  /// one, or else stops it along its direction.
+  void ShortenHorizon(const Model<double>& model, int k, State<double>* before);
   void GoOn(const Model<double>& model, int k, State<double>* before);
   double LongestOf(const Model<double>& model, int k, const Segment& segment, SolvedNode* start);
   double ShareOfDecay(const Model<double>& model, int k, const Segment& segment, SolvedNode* start);
@@ -119,6 +134,8 @@ class SupportModes {
   std::vector<int> sought_;  ///< what is sought of each support, by SupportState::Holds
   std::vector<char> turns_;  ///< the support is at rest, and the body turns about its only point
   std::vector<double> speeds_, last_speeds_;  ///< of supports, in this motion and the one before
+  bool may_creep_ = true;                     ///< in this motion: those that do have settled
+  std::vector<double> horizons_;              ///< of those that creep, s; 0: of others
   std::vector<int> turned_;  ///< how often the direction of a support has been changed
   std::vector<Rested> rested_;
   std::vector<SupportState> let_go_;  ///< by support; `slow` is kNothing: it is not let go

@@ -234,6 +234,20 @@ inline constexpr double kStartingAlong = 0.999999;
 inline constexpr double kLeastOfStart = 1e-5;
 /// Of dt: the first motion of a body that its support lets go.
 inline constexpr double kFirstOfSupport = 1e-3;
+/// Of the acceleration that its friction gives a body, and of the speed that this gives it in dt:
+/// one that is accelerated by less than the first, because what pushes it is as large as its
+/// friction and along it, and slower than the second, creeps. Friction turns faster ones in more
+/// than a thousandth of dt: motions resolve it.
+inline constexpr double kCreeping = 0.1;
+inline constexpr double kCreepingSpeed = 1e-3;
+/// Of the time in which a body that creeps comes to rest, as far as its acceleration tells: how
+/// long its horizon may be.
+inline constexpr double kHorizonOfRest = 0.5;
+/// Of the horizon of a body that creeps: the next one, where it would have stopped after it. And of
+/// dt: the least, below which it is stopped along its direction, and the first.
+inline constexpr double kShorterHorizon = 0.25;
+inline constexpr double kMostHorizon = 0.125;
+inline constexpr double kLeastHorizon = 1e-4;
 /// A motion changes the velocity of a point on a support by no more than this share; the error of a
 /// motion of fourth order is some 1e-8 of the way to rest.
 inline constexpr double kSupportTurn = 1.0 / 16.0;

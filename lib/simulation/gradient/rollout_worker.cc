@@ -76,7 +76,23 @@ bool RolloutWorker::Set(const RolloutInput& input, RolloutOutput* output) {
 bool RolloutWorker::SetForDerivatives(const RolloutInput& input, RolloutOutput* output) {
   if (!Set(input, output)) return false;
   if (model_.structure->paths.empty() && !model_.structure->has_releases) return true;
-  output->message = CoincidingEdges(model_, RowMatrixXd(ParameterJacobian()));
+  const RowMatrixXd directions(ParameterJacobian());
+  output->message = CoincidingEdges(model_, directions);
+  if (output->message.empty() && HasCoincidingPaths(model_, directions)) {
+    const StateObserver look = [&](long, double, const State<double>&, Stepper* stepper) {
+      if (stepper == nullptr || !output->message.empty()) return;
+      stepper->parts().ForEachPart([&](const IslandRecord& island, const EventPart& part) {
+        if (part.is_impulses || part.segment.edge_before < 0) return;
+        const std::string coupled =
+            CoupledPaths(model_, directions, island.NumberInWhole(part.segment.event_number),
+                         island.NumberInWhole(part.segment.edge_before),
+                         part.segment.time + part.segment.length);
+        if (output->message.empty()) output->message = coupled;
+      });
+    };
+    State<double> final;
+    Rollout(Controlled(), initial_, look, &*stepper_, &final);
+  }
   if (output->message.empty()) return true;
   output->status = RolloutStatus::kRefused;
   output->final = scene_state_;

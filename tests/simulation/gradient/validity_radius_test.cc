@@ -71,6 +71,24 @@ TEST(ValidityRadius, OfAFallEndsWhereTheImpactLeavesTheRun) {
   EXPECT_NEAR(fall.radius[0].down, (g * t - 1e-3) * t, 1e-6) << fall.radius[0].down_where;
 }
 
+// An impact that comes after the end enters the run of 0.4 s, also of steps at given times, as
+// those of a fit are.
+TEST(ValidityRadius, OfAFallEndsWhereTheImpactEntersTheRun) {
+  const double g = 9.81;
+  const double t = std::sqrt(2.0 / g);
+  Scene scene = test_scenes::SceneOf(kDroppedBall);
+  scene.simulation.stepping = Stepping::kEvent;
+  scene.simulation.duration = 0.4;
+  for (const std::vector<double>& times :
+       {std::vector<double>{}, std::vector<double>{0.0, 0.15, 0.3, 0.4}}) {
+    scene.simulation.step_times = times;
+    const GradientResult result = FinalStateJacobian(
+        scene, testing::Resolve(scene, {"bodies/ball/position/y"}), {.radius = RadiusPass::kRun});
+    ASSERT_EQ(result.certificate.radius.size(), 1u) << result.message;
+    EXPECT_NEAR(result.certificate.radius[0].down, (t - 0.4) * std::sqrt(2.0 * g), 1e-6);
+  }
+}
+
 // It stops at v / 2 s, also on a step's end: of a speed that takes 1 s the stop leaves the run. The
 // fractions of steps to which its motions are shortened are no events.
 TEST(ValidityRadius, OfABodyThatStopsOnItsSupport) {

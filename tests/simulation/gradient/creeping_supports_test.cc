@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Linked bodies on a table whose centres creep while others slide: pushed by hardly more or less
+// than their friction, which turns such slow velocities at once. Against an integration written
+// apart (Radau's method with the friction −μ N v / √(v² + ε²), ε of 1e-8 and 1e-7 m/s).
+#include <gtest/gtest.h>
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "../../support/gradients.h"
+#include "../../support/scenes.h"
+#include "tangible/simulation/stepping/rollout.h"
+
+namespace tangible {
+namespace {
+
+using test_scenes::SceneOf;
+using test_scenes::Text;
+
+// Links of 0.2 m and 0.5 kg in a row, of which the first one is struck.
+Scene StruckChain(const std::vector<double>& friction, const std::array<double, 3>& twist,
+                  double dt) {
+  std::string bodies, joints;
+  for (size_t i = 0; i < friction.size(); ++i) {
+    const double x = 0.2 * static_cast<double>(i);
+    bodies += std::string(i > 0 ? ", " : "") + R"({"name": "l)" + std::to_string(i) +
+              R"(", "shape": {"box": {"size": [0.2, 0.04]}}, "mass": 0.5, "position": [)" +
+              Text(x) + R"(, 0], "support": {"load": 4.9, "friction": )" + Text(friction[i]) + "}";
+    if (i == 0) {
+      bodies += R"(, "velocity": [)" + Text(twist[0]) + ", " + Text(twist[1]) +
+                R"(], "angular_velocity": )" + Text(twist[2]);
+    } else {
+      joints += std::string(i > 1 ? ", " : "") + R"({"name": "j)" + std::to_string(i) +
+                R"(", "type": "revolute", "bodies": ["l)" + std::to_string(i - 1) + R"(", "l)" +
+                std::to_string(i) + R"("], "anchor": [)" + Text(x - 0.1) + ", 0]}";
+    }
+    bodies += "}";
+  }
+  return SceneOf(R"({"gravity": [0, 0], "bodies": [)" + bodies + R"(], "joints": [)" + joints +
+                 R"(], "simulation": {"stepping": "event", "dt": )" + Text(dt) +
+                 R"(, "duration": 0.4}})");
+}
+
+void ExpectAtRest(const Scene& scene, const std::vector<double>& pose) {
+  Model<double> model;
+  State<double> state, final;
+  BuildModel(scene, &model, &state);
+  const RolloutReport report = Rollout(model, state, {}, &final);
+  ASSERT_EQ(report.status, StepStatus::kDone) << report.message;
+  for (size_t i = 0; i < pose.size(); ++i) {
+    EXPECT_NEAR(final.pose[i], pose[i], 5e-7) << i;
+    EXPECT_EQ(final.twist[i], 0.0) << i;
+  }
+}
+
+TEST(CreepingSupportsTest, TwoLinksComeToRest) {
+  for (const double dt : {0.02, 0.01}) {
+    ExpectAtRest(StruckChain({0.254, 0.31}, {0.452, 0.093, -0.16}, dt),
+                 {0.009613813, 0.004033459, -0.031365548, 0.209562149, 0.000193315, -0.007041091});
+    ExpectAtRest(StruckChain({0.312, 0.285}, {0.241, 0.371, 0.07}, dt),
+                 {0.004696785, 0.01998262, -0.088812422, 0.203792461, 0.001024445, -0.10105796});
+  }
+}
+
+TEST(CreepingSupportsTest, ThreeLinksComeToRest) {
+  ExpectAtRest(StruckChain({0.315, 0.264, 0.326}, {-0.277, 0.178, -0.42}, 0.02),
+               {-0.001741243, 0.005047014, -0.046777332, 0.19814936, 0.00032463, -0.000463559,
+                0.398148724, -0.000075358, -0.003536335});
+}
+
+TEST(CreepingSupportsTest, DerivativesAreThoseOfTheMotion) {
+  const Scene scene = StruckChain({0.254, 0.31}, {0.452, 0.093, -0.16}, 0.02);
+  const std::vector<std::string> paths = {"bodies/l0/velocity/y", "bodies/l0/support/friction",
+                                          "bodies/l1/support/friction"};
+  const GradientResult adjoint = testing::Jacobian(scene, paths, GradientMethod::kAdjoint);
+  for (const GradientMethod method :
+       {GradientMethod::kTangent, GradientMethod::kFiniteDifference}) {
+    const GradientResult other = testing::Jacobian(scene, paths, method, CertificatePass::kSkip);
+    const double within = method == GradientMethod::kTangent ? 1e-11 : 2e-5;
+    EXPECT_LT((other.jacobian - adjoint.jacobian).cwiseAbs().maxCoeff(),
+              within * adjoint.jacobian.cwiseAbs().maxCoeff());
+  }
+}
+
+}  // namespace
+}  // namespace tangible
