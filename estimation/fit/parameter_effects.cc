@@ -32,6 +32,31 @@ int FindNoEffect(const Eigen::VectorXd& effect) {
   return -1;
 }
 
+namespace {
+
+/// Whether a move of a parameter by its own magnitude leaves the cost as it is, although its
+/// derivative, as small as it is, would change it: then that is the rounding of terms that cancel.
+bool ChangesNothing(const Eigen::VectorXd& p, Eigen::Index k,
+                    const std::vector<ParameterEntry>& entries, Linearizer* linearizer) {
+  const ParameterEntry& entry = entries[static_cast<size_t>(k)];
+  const double step = std::max(std::abs(p[k]), entry.scale);
+  if (entry.logarithmic || !(p[k] + step < entry.upper)) return false;
+  const HuberBounds plain{0.0, 0.0};
+  Linearisation model, target;
+  Eigen::VectorXd moved = p, blocks;
+  moved[k] += step;
+  double cost = 0.0;
+  if (!linearizer->Linearise(ToInternal(entries, p), plain, &model, &target) ||
+      !linearizer->Cost(ToInternal(entries, moved), plain, &blocks, &cost)) {
+    return false;
+  }
+  const double expected = std::abs(target.gradient[k] * step);
+  return expected > kSeenInCost * target.cost &&
+         std::abs(cost - target.cost) < kShareOfExpected * expected;
+}
+
+}  // namespace
+
 void LeaveOutRounding(const Eigen::VectorXd& p, const std::vector<ParameterEntry>& entries,
                       Linearizer* linearizer, Eigen::VectorXd* effect) {
   const HuberBounds plain{0.0, 0.0};
@@ -59,6 +84,9 @@ void LeaveOutRounding(const Eigen::VectorXd& p, const std::vector<ParameterEntry
       is_rounding = linearizer->Linearise(ToInternal(entries, beside), plain, &model, &target) &&
                     std::abs(EffectsOf(linearizer->layout(), model)[k] - all[k]) >
                         kChangesAsRounding * all[k];
+    }
+    if (!is_rounding && effect_of(k) < kMayBeRounding) {
+      is_rounding = ChangesNothing(p, k, entries, linearizer);
     }
     if (is_rounding) (*effect)[k] = 0.0;
   }

@@ -2,6 +2,7 @@
 #include "tangible/estimation/fit/posterior.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <mutex>
@@ -25,6 +26,14 @@ constexpr double kDispersion = 2.0;
 constexpr double kMixedByChance = 10.0;
 // Of a matrix of more parameters the factor takes longer than the runs.
 constexpr Eigen::Index kMostParameters = 2000;
+
+// Of the size of a parameter, or of its standard deviation: where the density far out is looked at.
+constexpr std::array<double, 2> kFarOut = {1e4, 1e8};
+// Of more parameters this would take longer than the draws.
+constexpr size_t kMostOpenSides = 50;
+
+// The random numbers of starts within bounds are not those of the chains.
+constexpr std::uint32_t kWithinBounds = 1U << 20;
 
 int DrawsOfChain(const PosteriorOptions& options) {
   const int all = std::max(options.draws, options.least_draws);
@@ -213,6 +222,35 @@ Eigen::VectorXd StartOf(const Eigen::VectorXd& middle, double highest,
   return middle;
 }
 
+/// The same of every second chain: the first of some draws of what has two bounds, from all of its
+/// range, at which the density is not next to nothing. A mode far from the estimate is found so,
+/// and R-hat tells that chains do not agree. Empty where there is none.
+Eigen::VectorXd StartWithinBounds(const std::vector<FreeCoordinate>& coordinates,
+                                  const Eigen::VectorXd& middle, double highest,
+                                  PosteriorDensity* density, RandomStream* random) {
+  constexpr int kDraws = 32;
+  constexpr double kMostBelow = 20.0;
+  const auto is_bounded = [](const FreeCoordinate& one) {
+    return std::isfinite(one.lower) && std::isfinite(one.upper);
+  };
+  if (std::none_of(coordinates.begin(), coordinates.end(), is_bounded)) return {};
+  for (int i = 0; i < kDraws; ++i) {
+    Eigen::VectorXd start = middle;
+    for (size_t k = 0; k < coordinates.size(); ++k) {
+      const FreeCoordinate& one = coordinates[k];
+      if (!is_bounded(one)) continue;
+      start[static_cast<Eigen::Index>(k)] =
+          one.From(one.lower + random->Uniform() * (one.upper - one.lower));
+    }
+    double value = 0.0;
+    Eigen::VectorXd gradient;
+    if (start.allFinite() && (*density)(start, &value, &gradient) && value > highest - kMostBelow) {
+      return start;
+    }
+  }
+  return {};
+}
+
 /// The name of the first parameter whose density would have no finite integral; or empty.
 std::string FindImproper(const FitResult& result, const std::vector<FreeCoordinate>& coordinates,
                          const std::vector<ParameterEntry>& entries) {
@@ -225,6 +263,39 @@ std::string FindImproper(const FitResult& result, const std::vector<FreeCoordina
     if (told && !bounded && !entries[k].prior &&
         !IsAtBound(entries[k], result.estimate[static_cast<Eigen::Index>(k)])) {
       return entries[k].name;
+    }
+  }
+  return "";
+}
+
+/// Empty, or why the density has no finite integral: it does not fall, however far a parameter goes
+/// on a side without a bound, as that of a mass which the rest of the scene no longer moves.
+std::string FindOpenSide(const FitResult& result, const std::vector<FreeCoordinate>& coordinates,
+                         const std::vector<ParameterEntry>& entries, double cost,
+                         const Eigen::MatrixXd& information, PosteriorDensity* density) {
+  if (entries.size() > kMostOpenSides) return "";
+  for (size_t k = 0; k < entries.size(); ++k) {
+    const auto at = static_cast<Eigen::Index>(k);
+    double scale = std::abs(result.estimate[at]);
+    if (information(at, at) > 0.0) scale = std::max(scale, 1.0 / std::sqrt(information(at, at)));
+    for (const double side : {1.0, -1.0}) {
+      const double bound = side > 0.0 ? coordinates[k].upper : coordinates[k].lower;
+      if (entries[k].prior || std::isfinite(bound) || !(scale > 0.0)) continue;
+      std::array<double, 2> costs;
+      bool runs = true;
+      for (size_t i = 0; i < costs.size() && runs; ++i) {
+        Eigen::VectorXd far = result.estimate, gradient;
+        far[at] += side * kFarOut[i] * scale;
+        runs = density->Evaluate(far, &costs[i], &gradient, nullptr);
+      }
+      if (!runs || !(std::abs(costs[1] - costs[0]) <= kFlatFarOut) ||
+          !(costs[1] - cost <= kReached)) {
+        continue;
+      }
+      return "the observations do not determine '" + entries[k].name + "' towards " +
+             (side > 0.0 ? "large" : "small") + " values, at which the cost stays at " +
+             CompactNumber(costs[1], 6) + " (" + CompactNumber(cost, 6) +
+             " at the estimate): expected a prior of it, or " + (side > 0.0 ? "upper" : "lower");
     }
   }
   return "";
@@ -325,8 +396,14 @@ class ChainRunner {
                                              Eigen::VectorXd* gradient) {
         return density(x, value, gradient);
       };
-      const Eigen::VectorXd start =
-          StartOf(setup.middle, setup.highest, setup.factor, &density, &random);
+      Eigen::VectorXd start;
+      if (number % 2 == 1) {
+        RandomStream within(options_.seed, static_cast<std::uint32_t>(number) + kWithinBounds);
+        start = StartWithinBounds(coordinates_, setup.middle, setup.highest, &density, &within);
+      }
+      if (start.size() == 0) {
+        start = StartOf(setup.middle, setup.highest, setup.factor, &density, &random);
+      }
       const NutsChain made = SampleNuts(function, start, setup.factor, nuts, &random);
       FinishedChain& chain = chains[static_cast<size_t>(at)];
       chain = {estimate,
@@ -382,6 +459,8 @@ bool SetUpChains(const PosteriorOptions& options, const FitOptions& fit, const F
     *error = "the run at the estimate fails: " + density.message();
     return false;
   }
+  *error = FindOpenSide(result, coordinates, problem->entries(), cost, information, &density);
+  if (!error->empty()) return false;
   setup->middle = InsideOf(coordinates, result.estimate, gradient, information);
   const std::vector<FreeCoordinate::Value> values = density.ValuesAt(setup->middle);
   if (!density.Evaluate(density.ParametersAt(setup->middle), &cost, &gradient, &information)) {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <utility>
 #include <vector>
@@ -260,7 +261,7 @@ constexpr char kNoParabola[] = "the cost across the interval is no parabola";
 constexpr char kNoRunThere[] = "the model cannot be run across the interval";
 
 /// Empty where the cost at both ends of the interval, along the direction in which the others
-/// follow, rises as a parabola does; else why not.
+/// follow, rises as a parabola does, and rises there; else why not.
 std::string WhyNoParabola(const FitOptions& options, const FitResult& result, int k,
                           LeastSquaresProblem* problem, long* rollouts) {
   const Uncertainty& u = result.uncertainty;
@@ -273,18 +274,24 @@ std::string WhyNoParabola(const FitOptions& options, const FitResult& result, in
   const double length = std::sqrt(2.0 * rise / u.covariance(k, k));
   Linearizer linearizer(problem, options.derivatives, options.threads, nullptr);
   std::string why;
-  for (const double side : {-1.0, 1.0}) {
+  // NaN where there is no run.
+  const auto risen_at = [&](double way) {
     Eigen::VectorXd p = result.estimate;
-    for (Eigen::Index i = 0; i < u.covariance.rows(); ++i) {
-      p[i] += side * length * u.covariance(i, k);
-    }
+    for (Eigen::Index i = 0; i < u.covariance.rows(); ++i) p[i] += way * u.covariance(i, k);
     Eigen::VectorXd blocks;
     double cost = 0.0;
     const bool done =
         linearizer.Cost(ToInternal(entries, p), {options.huber, options.huber}, &blocks, &cost);
-    const double risen = cost - result.final_cost;
-    const bool parabola = risen < rise * kParabola && risen > rise / kParabola;
-    why = !done ? kNoRunThere : parabola ? "" : kNoParabola;
+    return done ? cost - result.final_cost : std::numeric_limits<double>::quiet_NaN();
+  };
+  for (const double side : {-length, length}) {
+    const double at_end = risen_at(side);
+    const double before = risen_at((1.0 - kLastOfWay) * side);
+    // What a parabola gains over the last part of its way.
+    const double last = (2.0 - kLastOfWay) * kLastOfWay * rise;
+    const bool parabola = at_end < rise * kParabola && at_end > rise / kParabola &&
+                          at_end - before > last * kStillRises;
+    why = std::isnan(at_end) ? kNoRunThere : parabola ? "" : kNoParabola;
     if (!why.empty()) break;
   }
   *rollouts += linearizer.rollouts();

@@ -14,8 +14,9 @@
 //
 // The values are those at 1, 2, 3, 5, 8, ... deviations in the minimiser's coordinate q, on both
 // sides, each begun from the nearest one; they go on beyond the first end, as far as a finite bound
-// or else some steps, so that further branches are found. Ends between two values are bisected. A
-// minimum that costs less than the estimate ends the search: the fit goes on from there.
+// or else some steps, so that further branches are found, if they are wider than the distance of
+// two values. Ends between two values are bisected. A minimum that costs less than the estimate
+// ends the search: the fit goes on from there.
 //
 // References: D. J. Venzon and S. H. Moolgavkar, Applied Statistics 37 (1988) 87 (intervals by
 // profiles); J. T. Kent, Biometrika 69 (1982) 19 (the ratio where the model is wrong).

@@ -22,6 +22,10 @@ inline constexpr double kBesideStep = 1e-6;
 inline constexpr double kRoundingBeside = 1e-10;
 inline constexpr double kNotSeen = 1e-6;
 inline constexpr double kChangesAsRounding = 1e-3;
+/// Of the cost: by how much a derivative that may be rounding must change it for that to be seen;
+/// and of that change: where the cost changes by less, it is rounding.
+inline constexpr double kSeenInCost = 1e-12;
+inline constexpr double kShareOfExpected = 0.1;
 /// Of the radius of the trust region: where an iteration has ended at values at which no parameter
 /// has an effect, it is repeated with a region so much smaller.
 inline constexpr double kSmallerRegion = 1e-3;
@@ -78,6 +82,10 @@ inline constexpr double kLevelFor = 30.0;
 /// Of the rise of a parabola at the ends of an interval: where the cost rises by more than this
 /// factor more or less, the interval by derivatives is not to be trusted.
 inline constexpr double kParabola = 1.5;
+/// Of the way to such an end, its last part; and of what a parabola rises over that: a cost that
+/// rises by less goes over into a plateau, and the interval may have no end.
+inline constexpr double kLastOfWay = 0.2;
+inline constexpr double kStillRises = 0.3;
 /// Of 1 σ²: starts whose costs differ by less are equally good, and agree.
 inline constexpr double kAgree = 1e-2;
 /// Of the way to a bound, or of 1 for a logarithm or the scale of a parameter where there is none:
@@ -171,6 +179,10 @@ inline constexpr double kLeastInformation = 1e-12;
 inline constexpr double kDesignRank = 1e-12;
 /// Of the duration of a take: an observation that is later by less is at its end.
 inline constexpr double kSameTakeTime = 1e-9;
+/// 1 σ²: a cost that changes by less between points far out stays as it is; and what it may have
+/// risen by for chains to come there.
+inline constexpr double kFlatFarOut = 0.5;
+inline constexpr double kReached = 30.0;
 /// Of the length of what candidates for missing parts of a model explain: differences of the square
 /// that are smaller do not tell them apart.
 inline constexpr double kSameExplained = 1e-2;

@@ -11,7 +11,10 @@
 //
 // A white force of intensity q has a = 0, c = 1 and s = q / √Δ in an interval of length Δ. With the
 // correlation time τ and the standard deviation s it has a = exp(−Δ/τ), where Δ is the distance of
-// the intervals, and c = √(1 − a²); the first has a = 0 and c = 1. To first order at a run
+// the intervals, and c = √(1 − a²); the first has a = 0 and c = 1. Where an interval, which is no
+// shorter than a step, is longer than τ, F is the mean of the process over it: with l = Δ/τ its
+// variance is s² 2 (l − 1 + e⁻ˡ) / l², and a is the correlation of two means that follow each
+// other, (1 − e⁻ˡ)² / (2 (l − 1 + e⁻ˡ)) at equal distances. To first order at a run
 //
 //   dx_{k+1} = X_k dx_k + G_k dF_k + P_k dp,    dx_0 = S dp                        (2)
 //   cost = 1/2 Σ_k (‖ε_k‖² + ‖W_k (r_k + H_k [dp; dx_k; dF_k])‖²)                  (3)

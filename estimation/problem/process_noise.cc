@@ -266,6 +266,28 @@ Controls FollowedForces::In(const Model<double>& model) const {
   return controls;
 }
 
+namespace {
+
+/// Whether a force that is constant over `length` stands for the mean of a process whose
+/// correlation time is shorter: knots cannot be nearer than steps.
+bool IsMean(double correlation_time, double length) {
+  return length > correlation_time * (1.0 + kKnotRounding);
+}
+
+/// The standard deviation of the mean of an Ornstein-Uhlenbeck process of variance 1 over `length`,
+/// in correlation times.
+double DeviationOfMean(double length) {
+  return std::sqrt(2.0 * (length + std::expm1(-length))) / length;
+}
+
+/// The correlation of its means over two lengths, one behind the other.
+double CorrelationOfMeans(double before, double behind) {
+  return std::expm1(-before) * std::expm1(-behind) /
+         (before * behind * DeviationOfMean(before) * DeviationOfMean(behind));
+}
+
+}  // namespace
+
 /// (1) of noise_sweep.h, with the forces as they are.
 void ProcessNoise::SetScale(const Eigen::VectorXd& intensities,
                             std::vector<NoiseInterval>* intervals) const {
@@ -280,7 +302,16 @@ void ProcessNoise::SetScale(const Eigen::VectorXd& intensities,
       const double time = terms_[i].correlation_time;
       if (time == 0.0) {
         interval.size[i] /= std::sqrt(lengths_[k]);
-      } else if (k > 0) {
+        continue;
+      }
+      const bool is_mean = IsMean(time, lengths_[k]);
+      if (is_mean) interval.size[i] *= DeviationOfMean(lengths_[k] / time);
+      if (k == 0) continue;
+      if (is_mean || IsMean(time, lengths_[k - 1])) {
+        const double decay = CorrelationOfMeans(lengths_[k - 1] / time, lengths_[k] / time);
+        interval.decay[i] = decay;
+        interval.drive[i] = std::sqrt((1.0 - decay) * (1.0 + decay));
+      } else {
         const double distance = 0.5 * (lengths_[k - 1] + lengths_[k]);
         interval.decay[i] = std::exp(-distance / time);
         interval.drive[i] = std::sqrt(-std::expm1(-2.0 * distance / time));

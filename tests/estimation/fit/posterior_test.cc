@@ -266,6 +266,66 @@ TEST(PosteriorTest, WhatIsNotDeterminedIsRefused) {
             "the observations do not determine 'p': expected a prior of it, or lower and upper");
 }
 
+/// An observation of e^−p, of which that of a large p is 0.
+class SaturatingProblem : public MeanProblem {
+ public:
+  using MeanProblem::MeanProblem;
+  bool EvaluateBlock(int /*block*/, const Eigen::VectorXd& p, GradientMethod /*method*/,
+                     BlockDerivatives /*derivatives*/, BlockEvaluation* evaluation) override {
+    const double weight = 5.0;
+    evaluation->residuals = Eigen::VectorXd::Constant(1, weight * (std::exp(-p[0]) - 0.3));
+    evaluation->jacobian = RowMatrixXd::Constant(1, 1, -weight * std::exp(-p[0]));
+    return true;
+  }
+};
+
+// Its density tends to e^−1.125 of the largest: it has no finite integral.
+TEST(PosteriorTest, ADensityThatDoesNotFallIsRefused) {
+  const auto error_with = [](double upper, std::optional<Prior> prior) {
+    ParameterEntry entry = {"p", 1.0, 0.0, upper, false, 1.0};
+    entry.prior = prior;
+    return Draw(MakerWithPriors<SaturatingProblem>([=] { return SaturatingProblem(entry, {0.0}); }))
+        .error;
+  };
+  EXPECT_NE(error_with(kUnbounded, {})
+                .find("the observations do not determine 'p' towards large "
+                      "values, at which the cost stays at 1.125"),
+            std::string::npos)
+      << error_with(kUnbounded, {});
+  EXPECT_EQ(error_with(10.0, {}), "");
+  EXPECT_EQ(error_with(kUnbounded, Prior{PriorKind::kGaussian, 1.0, 1.0}), "");
+}
+
+/// An observation of p².
+class SquareProblem : public MeanProblem {
+ public:
+  using MeanProblem::MeanProblem;
+  bool EvaluateBlock(int /*block*/, const Eigen::VectorXd& p, GradientMethod /*method*/,
+                     BlockDerivatives /*derivatives*/, BlockEvaluation* evaluation) override {
+    evaluation->residuals = Eigen::VectorXd::Constant(1, 20.0 * (p[0] * p[0] - 1.0));
+    evaluation->jacobian = RowMatrixXd::Constant(1, 1, 40.0 * p[0]);
+    return true;
+  }
+};
+
+// Modes at ±1, forty deviations from each other: a chain that begins within the bounds finds the
+// other one, and chains then do not agree.
+TEST(PosteriorTest, AModeFarFromTheEstimateIsFoundWithinBounds) {
+  const auto draw = [](double lower, double upper) {
+    const ParameterEntry entry = {"p", 0.8, lower, upper, false, 1.0};
+    return Draw(MakerWithPriors<SquareProblem>([=] { return SquareProblem(entry, {0.0}); }));
+  };
+  const Drawn both = draw(-3.0, 3.0);
+  EXPECT_LT(both.posterior.draws.minCoeff(), -0.9);
+  EXPECT_GT(both.posterior.draws.maxCoeff(), 0.9);
+  ASSERT_FALSE(both.posterior.warnings.empty());
+  EXPECT_NE(both.posterior.warnings[0].find("the chains do not agree"), std::string::npos)
+      << both.posterior.warnings[0];
+  const Drawn one = draw(0.0, 3.0);
+  EXPECT_GT(one.posterior.draws.minCoeff(), 0.8);
+  EXPECT_LT(one.posterior.parameters[0].r_hat, 1.02);
+}
+
 // Where a run fails on one side of the estimate it is said how often that ended a trajectory.
 TEST(PosteriorTest, DivergencesAreCountedAndSaid) {
   class Failing : public MeanProblem {

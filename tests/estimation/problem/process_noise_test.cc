@@ -302,6 +302,23 @@ TEST(ProcessNoiseTest, TheGradientIsThatOfTheLeastCost) {
                  {OnBody("box", NoiseCoordinate::kX, 0.5)}, 0.0);
 }
 
+// A correlation time far below a step makes a white force of intensity s √(2 τ), one of a step a
+// process whose means over steps are less than its values.
+TEST(ProcessNoiseTest, AShortCorrelationTimeIsThatOfMeans) {
+  const Pushed pushed(0.4 / std::sqrt(0.02), 0.0, 3);
+  const auto deviation = [&](double intensity, double time) {
+    const std::unique_ptr<RecordingsProblem> problem =
+        pushed.Problem(OnJoint("rail", NoiseCoordinate::kDisplacement, intensity, time));
+    VarianceComponents components;
+    const FitResult result = FitWithComponents(FitOptions(), problem.get(), {}, &components);
+    EXPECT_EQ(result.status, FitStatus::kConverged) << result.message;
+    return result.uncertainty.standard_deviation[1];
+  };
+  const double white = deviation(0.4, 0.0);
+  EXPECT_NEAR(deviation(0.4 / std::sqrt(2e-6), 1e-6), white, 1e-3 * white);
+  EXPECT_NEAR(deviation(0.4 / std::sqrt(2e-3), 1e-3), white, 0.1 * white);
+}
+
 TEST(ProcessNoiseTest, EventStepping) {
   std::string text = kPendulum;
   text.replace(text.find("\"joint_correction\": \"projection\""), 32, "\"stepping\": \"event\"");
