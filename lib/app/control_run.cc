@@ -19,6 +19,7 @@
 #include "tangible/math/random.h"
 #include "tangible/render/html.h"
 #include "tangible/scene/scene_names.h"
+#include "tangible/simulation/stepping/joint_opening.h"
 
 namespace tangible {
 namespace {
@@ -453,6 +454,22 @@ PredictiveRun Control(const ControlFile& file, const ControlRunOptions& wanted, 
   return run;
 }
 
+// Empty, or why a control is another quantity in the plant: its joint is of another type.
+std::string OtherJoint(const Scene& model, const Scene& plant, const std::string& path) {
+  const auto type_in = [&](const Scene& scene) {
+    std::string type;
+    for (const auto& joint : scene.joints) {
+      if (path.starts_with("joints/" + joint.name + "/"))
+        type = NameOf(joint.type, kJointTypeNames);
+    }
+    return type;
+  };
+  const std::string expected = type_in(model), got = type_in(plant);
+  return expected == got
+             ? ""
+             : path + ": expected a joint of the model's type, " + expected + ", got " + got;
+}
+
 // Of the model's run with the controls that were played, which is about what the plans were for.
 Certificate CertifyPlayed(const ControlFile& file, const RowMatrixXd& controls) {
   Scene scene = file.scene;
@@ -494,9 +511,26 @@ std::string CheckPlant(const ControlFile& file, const Scene& plant, const std::s
            Listed(expected) + ", got " + Listed(got);
   }
   int which = -1;
-  const std::string error = CheckControls(plant, file.paths, &which);
+  std::string error = CheckControls(plant, file.paths, &which);
+  for (size_t i = 0; i < file.paths.size() && error.empty(); ++i) {
+    error = OtherJoint(file.scene, plant, file.paths[i]);
+  }
   return error.empty() ? "" : name + ": " + error;
 }
+
+namespace {
+
+// Empty, or a joint of the plant that is open at the end.
+std::string OpenAtEnd(const Scene& plant, const RolloutFunction& function,
+                      const RowMatrixXd& states, double time) {
+  Model<double> model;
+  State<double> final;
+  BuildModel(plant, &model, &final);
+  function.SetState(states.row(states.rows() - 1), &final);
+  return OpenJointOf(model, final, time);
+}
+
+}  // namespace
 
 std::string RunPredictive(const std::string& name, const ControlFile& file, const Scene& plant,
                           const std::string& plant_name, const ControlRunOptions& options,
@@ -524,6 +558,8 @@ std::string RunPredictive(const std::string& name, const ControlFile& file, cons
                             made.failure);
   }
   if (made.left_maximum) run->warnings.push_back(WarningOfMaximum());
+  const std::string open = OpenAtEnd(plant, of_plant, made.states, file.run_duration);
+  if (!open.empty()) run->warnings.push_back(open);
   const bool no_effect = made.without_effect == static_cast<long>(made.seconds.size());
   if (no_effect) {
     run->verdict = {"no_effect_on_target",

@@ -202,12 +202,41 @@ class Solver {
     return true;
   }
 
+  // Twice the second-order term of the cost's change along its gradient by a control.
+  double CurvatureAlong(int control) const {
+    const long steps = result_.plan.controls.rows();
+    VectorX<double> change = VectorX<double>::Zero(n_);
+    double curvature = 0.0;
+    for (long k = 0; k < steps; ++k) {
+      const CostExpansion& cost = at_.cost[k];
+      const double u = gradient_(k, control);
+      curvature += change.dot(cost.xx * change) + 2.0 * u * cost.ux.row(control).dot(change) +
+                   u * u * cost.uu(control, control);
+      change = at_.a[k] * change + u * at_.b[k].col(control);
+    }
+    return curvature + change.dot(at_.cost[steps].xx * change);
+  }
+
+  // The range of each control; of one without bounds, at which values are large by the scene's
+  // units alone, at least the way along the gradient to the least cost.
+  VectorX<double> Ranges() const {
+    VectorX<double> sizes = ControlSizes(p_, result_.plan.controls);
+    for (int i = 0; i < m_; ++i) {
+      if (std::isfinite(p_.low[i]) && std::isfinite(p_.high[i])) continue;
+      const double curvature = CurvatureAlong(i);
+      if (!(curvature > 0.0)) continue;
+      const double way = gradient_.col(i).squaredNorm() / curvature;
+      sizes[i] = std::max(sizes[i], way * gradient_.col(i).cwiseAbs().maxCoeff());
+    }
+    return sizes;
+  }
+
   // Whether the plan is stationary, or the target is met.
   bool Measure() {
     Gradient(at_, &costates_, &gradient_);
     const Plan& plan = result_.plan;
     double sum = 0.0;
-    const VectorX<double> sizes = ControlSizes(p_, plan.controls);
+    const VectorX<double> sizes = Ranges();
     for (int i = 0; i < m_; ++i) {
       for (long k = 0; k < plan.controls.rows(); ++k) {
         const double g = gradient_(k, i);

@@ -65,8 +65,8 @@ using IlqrProgress = std::function<void(int start, long number, const IlqrIterat
 struct IlqrOptions {
   int max_iterations = 200;  ///< >= 1
   /// The plan has converged when moving every control of every step by its range (ControlSizes of
-  /// sampled_surrogate.h) against the gradient would change the cost, to first order, by at most
-  /// this fraction of the cost.
+  /// sampled_surrogate.h; without bounds at least the way to the least cost along the gradient)
+  /// against the gradient would change the cost, to first order, by at most this fraction of it.
   double gradient_tolerance = kGradientTolerance;
   bool second_order = false;
   /// Curvature from secants; without effect with second_order, which is exact.

@@ -348,6 +348,19 @@ TEST(Ilqr, WhereNothingMovesThereIsNothingToDo) {
   EXPECT_EQ(found.plan.cost, 0.5);
 }
 
+// A control without bounds has the range of what it takes to move anything: forces on a ship.
+TEST(Ilqr, AControlWithoutBoundsMayHaveToBeLarge) {
+  Linear map(MatrixX<double>::Identity(1, 1), MatrixX<double>::Constant(1, 1, 1e-9));
+  const Cost cost = EndAt(1.0, 1);
+  for (const double low : {-kInfinity, 0.0}) {
+    ControlProblem problem = ProblemOf(&map, &cost, VectorX<double>::Zero(1), kInfinity);
+    problem.low.setConstant(low);
+    const IlqrResult found = SolveIlqr(problem, RowMatrixXd::Zero(5, 1), {});
+    EXPECT_EQ(found.status, IlqrStatus::kConverged) << found.message;
+    EXPECT_NEAR(found.plan.states(5, 0), 1.0, 1e-6);
+  }
+}
+
 // What is left of the cost is rounding, of which no step is a decrease.
 TEST(Ilqr, ATargetThatIsMetHasConverged) {
   Linear map(MatrixX<double>::Identity(1, 1), MatrixX<double>::Ones(1, 1));

@@ -465,10 +465,32 @@ TEST_F(TangibleControlTest, MistakesOfThePlantAreItsOwn) {
   ExpectOneLine(with("\"dt\": 0.05", "\"dt\": 0.1"), 1, "plant.json: /simulation/dt: expected");
   ExpectOneLine(with("\"name\": \"rail\"", "\"name\": \"track\""), 1,
                 "plant.json: parameter joints/rail/effort: matches no number");
+  ExpectOneLine(with(R"("prismatic", "bodies": ["cart", "world"], "anchor": [0, 0],
+              "axis": [1, 0])",
+                     R"("revolute", "bodies": ["cart", "world"], "anchor": [0, 0])"),
+                1,
+                "plant.json: joints/rail/effort: expected a joint of the model's type, prismatic, "
+                "got revolute");
   ExpectOneLine(
       with("{\"bodies\": [",
            R"({"bodies": [{"name": "dog", "mass": 1, "inertia": 1, "position": [9, 9]},)"),
       1, "plant.json: /bodies: expected the moving bodies of");
+}
+
+// By fixed steps nothing keeps the hinge of a rod that turns closed: the run that was played says
+// so.
+TEST_F(TangibleControlTest, AHingeThatComesApartUnderMpcIsNamed) {
+  Write("rod.json", R"({"bodies": [
+      {"name": "rod", "shape": {"box": {"size": [0.04, 1]}}, "mass": 1, "position": [0, -0.5],
+       "velocity": [4, 0], "angular_velocity": 8}],
+    "joints": [{"name": "hinge", "type": "revolute", "bodies": ["rod", "world"], "anchor": [0, 0]}],
+    "simulation": {"dt": 0.02, "duration": 1}})");
+  const ProgramRun run = Control(
+      R"({"scene": "rod.json", "controls": [{"path": "joints/hinge/effort", "low": -1, "high": 1}],
+          "cost": [{"state": "rod/omega", "target": 8}], "mpc": {"duration": 2, "horizon": 0.1}})",
+      "--mpc");
+  EXPECT_EQ(run.exit_status, 0) << run.error;
+  EXPECT_NE(run.error.find("warning: joint hinge is open by"), std::string::npos) << run.error;
 }
 
 // A force that ends before the horizon does, and costs nothing, is a convex problem as any other.
