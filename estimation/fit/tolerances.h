@@ -84,7 +84,7 @@ inline constexpr double kLevelFor = 30.0;
 inline constexpr double kParabola = 1.5;
 /// Of the way to such an end, its last part; and of what a parabola rises over that: a cost that
 /// rises by less goes over into a plateau, and the interval may have no end.
-inline constexpr double kLastOfWay = 0.2;
+inline constexpr double kLastOfWay = 0.05;
 inline constexpr double kStillRises = 0.3;
 /// Of 1 σ²: starts whose costs differ by less are equally good, and agree.
 inline constexpr double kAgree = 1e-2;

@@ -87,6 +87,7 @@ void SupportModes::StartStep(const ModelStructure& structure, double t) {
   dt_ = structure.settings.dt;
   rested_.clear();
   let_go_.assign(structure.supports.size(), SupportState());
+  unsettled_start_.assign(structure.supports.size(), 0);
   speeds_.assign(structure.supports.size(), 0.0);
   last_speeds_ = speeds_;
 }
@@ -159,7 +160,8 @@ SupportModes::Course SupportModes::CourseOf(const Model<double>& model, int k, d
   if (at->holds != SupportState::kNothing) return Course::kTurns;
   // Whether it starts, its acceleration from rest tells. What was faster before does not.
   const bool has_slowed = speed < last_speeds_[k];
-  if (speed <= kStartingSupport * unit * dt_ && !has_slowed) return Course::kStarts;
+  const bool may_start = !has_slowed && unsettled_start_[k] == 0;
+  if (speed <= kStartingSupport * unit * dt_ && may_start) return Course::kStarts;
   return CourseOfPoints(support, stops, kStartingSupport * unit * dt_, at);
 }
 
@@ -187,6 +189,7 @@ void SupportModes::Begin(const Model<double>& model, double slow, Segment* segme
   turned_.assign(s.supports.size(), 0);
   horizons_.assign(s.supports.size(), 0.0);
   may_creep_ = true;
+  times_gone_on_ = 0;
   changes_ = 0;
   times_let_go_ = 0;
   unsettled_ = -1;
@@ -248,16 +251,27 @@ bool SupportModes::LetGo(const Model<double>& model, State<double>* before) {
 
 bool SupportModes::GoOnInstead(const Model<double>& model, State<double>* before) {
   bool any = false;
-  if (changes_ <= kMostOfSlow) return any;
+  if (changes_ <= kMostOfSlow || times_gone_on_ >= kMostGoneOn) return any;
   for (int k = 0; k < static_cast<int>(before->supports.size()); ++k) {
     const bool creeps = courses_[k] == Course::kCreeps && changes_ > kMostOfCreeping;
     if (!HasBegun(k) && !creeps) continue;
     GoOn(model, k, before);
+    // Where the friction of its slow point does not settle again, its velocity tells that too.
+    if (times_gone_on_ > 0) SlideOn(k, &before->supports[k]);
+    unsettled_start_[k] = 1;
     any = true;
     may_creep_ = may_creep_ && !creeps;
   }
+  times_gone_on_ += any ? 1 : 0;
   if (any) changes_ = 0;
   return any;
+}
+
+void SupportModes::SlideOn(int k, SupportState* at) {
+  sought_[k] = SupportState::kNothing;
+  at->slow = SupportState::kNothing;
+  at->is_sought = false;
+  if (courses_[k] == Course::kPasses) courses_[k] = Course::kSlides;
 }
 
 // At first it has none.
@@ -286,7 +300,10 @@ bool SupportModes::FindCreeping(const Model<double>& model, const ContactSolutio
   if (!may_creep_ || (s.joints.empty() && segment->contacts.empty())) return false;
   bool any = false;
   for (int k = 0; k < static_cast<int>(s.supports.size()); ++k) {
-    if (courses_[k] != Course::kSlides) continue;
+    const Course course = courses_[k];
+    if (course != Course::kSlides && course != Course::kTurns && course != Course::kPasses) {
+      continue;
+    }
     friction_.Set(model, segment->before, s.supports[k], 1.0);
     const BodyIndex& body = s.bodies[s.supports[k].body];
     const double unit = friction_.limit() / model.parameters[body.mass];
@@ -313,7 +330,12 @@ bool SupportModes::FindCreeping(const Model<double>& model, const ContactSolutio
 void SupportModes::SeekCreeping(const Model<double>& model, int k, const double* acceleration,
                                 State<double>* before) {
   SupportState& at = before->supports[k];
+  const int holds = at.holds;
   Seek(k, SupportState::kBody, &at);
+  // A point at rest stays the pivot.
+  if (holds >= 0 && holds != WholeOf(model.structure->supports[k], SupportState::kBody)) {
+    at.holds = holds;
+  }
   const size_t first = 3 * static_cast<size_t>(model.structure->supports[k].body);
   for (size_t i = 0; i < 3; ++i) {
     at.twist[i] = acceleration[i] + before->twist[first + i] / horizons_[k];
@@ -389,7 +411,8 @@ bool SupportModes::AcceptAll(const Model<double>& model, const ContactProblem<do
       at.is_sought = false;
     }
     if (!settled) unsettled_ = k;
-    if (settled && courses_[k] == Course::kCreeps && at.holds != SupportState::kNothing) {
+    if (settled && courses_[k] == Course::kCreeps &&
+        at.holds == WholeOf(s.supports[k], SupportState::kBody)) {
       ShortenHorizon(model, k, &before);
       accepted = false;
     }

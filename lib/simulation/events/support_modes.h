@@ -71,6 +71,7 @@ class SupportModes {
   static constexpr int kMostLetGo = 3;
   static constexpr int kMostOfSlow = 12;  ///< changes where a body is slow, and need not be at rest
   static constexpr int kMostOfCreeping = 40;  ///< and where one creeps
+  static constexpr int kMostGoneOn = 5;       ///< times that slow bodies slide on, in a motion
 
   /// What a support does, and why.
   enum class Course : char {
@@ -121,18 +122,23 @@ class SupportModes {
   /// one, or else stops it along its direction.
   void ShortenHorizon(const Model<double>& model, int k, State<double>* before);
   void GoOn(const Model<double>& model, int k, State<double>* before);
+  /// By all of its velocities, without what is sought of it.
+  void SlideOn(int k, SupportState* at);
   double LongestOf(const Model<double>& model, int k, const Segment& segment, SolvedNode* start);
   double ShareOfDecay(const Model<double>& model, int k, const Segment& segment, SolvedNode* start);
 
   double start_ = 0.0;  ///< of the step
   double dt_ = 0.0;
   int changes_ = 0;
+  int times_gone_on_ = 0;
   int times_let_go_ = 0;  ///< without accelerations, in this motion
   int unsettled_ = -1;
   bool started_ = false;  ///< the iteration of bodies at rest
   std::vector<Course> courses_;
   std::vector<int> sought_;  ///< what is sought of each support, by SupportState::Holds
   std::vector<char> turns_;  ///< the support is at rest, and the body turns about its only point
+  /// Friction of a body that starts has not settled in this step: it slides on by its velocity.
+  std::vector<char> unsettled_start_;
   std::vector<double> speeds_, last_speeds_;  ///< of supports, in this motion and the one before
   bool may_creep_ = true;                     ///< in this motion: those that do have settled
   std::vector<double> horizons_;              ///< of those that creep, s; 0: of others

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -68,6 +69,38 @@ TEST(CreepingSupportsTest, ThreeLinksComeToRest) {
   ExpectAtRest(StruckChain({0.315, 0.264, 0.326}, {-0.277, 0.178, -0.42}, 0.02),
                {-0.001741243, 0.005047014, -0.046777332, 0.19814936, 0.00032463, -0.000463559,
                 0.398148724, -0.000075358, -0.003536335});
+}
+
+// Two links on points, of which the first one is pinned, and a force that grows until they move:
+// the points of the second one start in directions of their own. Beside short fixed steps, whose
+// error is of first order.
+TEST(CreepingSupportsTest, AGrowingForceMovesLinksOnPoints) {
+  const auto scene = [](const std::string& stepping, double dt) {
+    return SceneOf(R"({"gravity": [0, 0], "bodies": [
+        {"name": "l0", "shape": {"box": {"size": [0.2, 0.04]}}, "mass": 0.86,
+         "position": [0.09950041652780256, 0.009983341664682817], "angle": 0.1,
+         "support": {"friction": 0.153, "load": 3.26, "points": [[-0.1, 0], [0.1, 0]]}},
+        {"name": "l1", "shape": {"box": {"size": [0.2, 0.04]}}, "mass": 0.82,
+         "position": [0.22025343056548452, 0.11768222507725275], "angle": 1.3566370614359173,
+         "support": {"friction": 0.123, "points": [[-0.08, -0.02], [0.08, -0.02], [0, 0.02]]}}],
+      "joints": [
+        {"name": "j0", "type": "revolute", "bodies": ["l0", "l1"],
+         "anchor": [0.19900083305560512, 0.019966683329365634]},
+        {"name": "pin", "type": "revolute", "bodies": ["l0", "world"], "anchor": [0, 0]}],
+      "forces": [{"name": "p", "body": "l1", "force": {"time": [0, 0.3], "x": [0, -1.33],
+                  "y": [0, 2.03], "interpolation": "linear"}}],
+      "no_contact": [["*", "*"]], "simulation": {"stepping": ")" +
+                   stepping + R"(", "dt": )" + Text(dt) + R"(, "duration": 0.3}})");
+  };
+  Model<double> model;
+  State<double> initial, final, fine;
+  BuildModel(scene("event", 0.02), &model, &initial);
+  const RolloutReport report = Rollout(model, initial, {}, &final);
+  ASSERT_EQ(report.status, StepStatus::kDone) << report.message;
+  BuildModel(scene("fixed", 2e-4), &model, &initial);
+  ASSERT_EQ(Rollout(model, initial, {}, &fine).status, StepStatus::kDone);
+  EXPECT_GT(std::abs(final.pose[5] - initial.pose[5]), 1e-3);
+  for (size_t i = 0; i < 6; ++i) EXPECT_NEAR(final.pose[i], fine.pose[i], 5e-5) << i;
 }
 
 TEST(CreepingSupportsTest, DerivativesAreThoseOfTheMotion) {
