@@ -304,6 +304,8 @@ bool SupportModes::FindCreeping(const Model<double>& model, const ContactSolutio
     if (course != Course::kSlides && course != Course::kTurns && course != Course::kPasses) {
       continue;
     }
+    // A single point that rests is a pivot, and has no speed.
+    if (segment->before.supports[k].holds == WholeOf(s.supports[k], SupportState::kBody)) continue;
     friction_.Set(model, segment->before, s.supports[k], 1.0);
     const BodyIndex& body = s.bodies[s.supports[k].body];
     const double unit = friction_.limit() / model.parameters[body.mass];
