@@ -327,8 +327,9 @@ std::string CoincideAt(const ModelStructure& s, const WindowEdge& a, const Windo
          " s: the derivative depends on their order (set one a little apart)";
 }
 
-// Calls visit(a, b) for edges at one instant, one behind the other, not both of which are knots at
-// which nothing jumps, and whose times do not vary alike; until it returns false.
+// Calls visit(a, b) for neighbours among the edges at one instant of which the directions vary the
+// time of one at least, until it returns false. Two windows of forces, and knots at which nothing
+// jumps, do not count: their order is decided elsewhere, or does not matter.
 template <typename Visit>
 void ForEachCoincidence(const Model<double>& model, const RowMatrixXd& directions,
                         const Visit& visit) {
