@@ -183,12 +183,13 @@ class Equations {
   }
 
   /// Friction of a body on the plane of motion: each point of its support is an element.
+  /// Corrections of poses have no friction, and leave what is held where it is.
   void Support(int k) {
+    const SupportIndex& support = s_.supports[k];
+    const SupportState* at = b_.SupportAt(k);
+    if (at == nullptr) return Hold(k, -1);
+    if (at->holds == SupportState::kBody) return HoldBody(k);
     if constexpr (kLevel != Level::kCorrection) {
-      const SupportIndex& support = s_.supports[k];
-      const SupportState* at = b_.SupportAt(k);
-      if (at == nullptr) return Hold(k, -1);
-      if (at->holds == SupportState::kBody) return HoldBody(k);
       // At an instant friction, which is a force, does nothing; what is held stays so.
       if (Weight() > 0.0 && support.kind == SupportIndex::kDisc) {
         DiscSlides(support, *at);
@@ -197,8 +198,8 @@ class Equations {
           if (i != at->holds) PointSlides(support, i, *at);
         }
       }
-      Hold(k, at->holds);
     }
+    Hold(k, at->holds);
   }
 
   /// What the friction of a joint that slides is below that at rest. Steps of a fixed size do not

@@ -218,10 +218,14 @@ SupportState SupportFriction::SolveDisc(const double mass[3], const double momen
       },
       0.0, kRight);
   friction(angle, &force, &torque);
-  for (int i = 0; i < 2 && push > 0.0; ++i) {
-    state.twist[i] = std::max(0.0, push - force) * momentum[i] / (push * mass[i]);
-  }
-  state.twist[2] = std::copysign(std::max(0.0, turn - torque) / mass[2], momentum[2]);
+  // Of a wrench that is hardly too large for the support both differences are rounding, and their
+  // ratio is not; the angle is right there too.
+  const double along = push > 0.0 ? std::sin(angle) : 0.0;
+  const double about = turn > 0.0 ? std::cos(angle) : 0.0;
+  const double size = along * std::max(0.0, push - force) / mass[0] +
+                      about * radius_ * std::max(0.0, turn - torque) / mass[2];
+  for (int i = 0; i < 2 && push > 0.0; ++i) state.twist[i] = size * along * momentum[i] / push;
+  state.twist[2] = std::copysign(size * about / radius_, momentum[2]);
   return state;
 }
 

@@ -81,11 +81,37 @@ void SizesOfTerms(const SolvedNode& node, std::vector<double>* sizes) {
   }
 }
 
+// The largest acceleration, of bodies and of what pushes them.
+double LargestAcceleration(const SolvedNode& node) {
+  double most = 0.0;
+  for (size_t i = 0; i < node.solution.motion.size(); ++i) {
+    const double pushed = std::abs(node.problem.load[i]) / node.problem.mass[i];
+    most = std::max({most, pushed, std::abs(node.solution.motion[i])});
+  }
+  return most;
+}
+
+// What its support holds of a body does not move, by the rounding of motions of this size neither.
+void KeepHeld(const ModelStructure& s, const std::vector<SupportState>& supports, double size,
+              std::vector<double>* motion) {
+  for (size_t k = 0; k < supports.size(); ++k) {
+    const bool is_held = supports[k].holds == SupportState::kBody;
+    const bool is_centre = s.supports[k].kind == SupportIndex::kCentre && supports[k].holds == 0;
+    if (!is_held && !is_centre) continue;
+    double* const of_body = &(*motion)[3 * static_cast<size_t>(s.bodies[s.supports[k].body].block)];
+    const int count = is_held ? 3 : 2;
+    const bool is_rounding = std::all_of(of_body, of_body + count, [&](double component) {
+      return std::abs(component) <= 16.0 * kSettled * size;
+    });
+    if (is_rounding) std::fill_n(of_body, count, 0.0);
+  }
+}
+
 // Whether in a correction's problem the points of some hinge have come apart by more than this
 // fraction of its arms, after a motion that started with the hinge closed.
 bool DriftsFar(const Model<double>& model, const ContactProblem<double>& correction) {
   constexpr double kShareOfArms = 0.1;
-  for (size_t j = 0; j < correction.joints.size(); ++j) {
+  for (size_t j = 0; j < model.structure->joints.size(); ++j) {
     const JointIndex& joint = model.structure->joints[j];
     const double* anchors = &model.parameters[joint.geometry];
     if (joint.type != JointType::kRevolute || correction.joints[j].rows == 0) {
@@ -161,7 +187,11 @@ bool SegmentFlow::Accelerate(const Model<double>& model, const Segment& segment,
   AssembleAcceleration(model, state, time, segment.middle, segment.contacts, segment.friction,
                        &assembly_, &node->problem);
   AddEdgesToCome(model, segment, &node->problem);
-  return Solve(segment.modes, node);
+  if (!Solve(segment.modes, node)) return false;
+  if (!state.supports.empty()) {
+    KeepHeld(*model.structure, state.supports, LargestAcceleration(*node), &node->solution.motion);
+  }
+  return true;
 }
 
 // Solves the last stage, which depends on its own accelerations (implicit_stage.h).
@@ -306,7 +336,7 @@ SegmentFlow::PoseErrors SegmentFlow::ErrorsOf(const Model<double>& model, const 
     errors.Add(std::abs(error), std::max(least, kCorrected) + kCoordinateRounding * angle,
                kSettled * (1.0 + angle));
   };
-  for (size_t j = 0; j < node.problem.joints.size(); ++j) {
+  for (size_t j = 0; j < structure.joints.size(); ++j) {
     const JointIndex& joint = structure.joints[j];
     const JointBlock<double>& block = node.problem.joints[j];
     for (int k = 0; k < block.rows; ++k) {
@@ -442,6 +472,7 @@ bool SegmentFlow::CorrectPoses(const Model<double>& model, Segment* segment, std
           "rows are off: masses are too far apart";
       return false;
     }
+    KeepHeld(structure, node.state.supports, errors.error, &node.solution.motion);
     AddBodies(structure, 1.0, node.solution.motion, &segment->after.pose);
     segment->num_corrections = k + 1;
   }

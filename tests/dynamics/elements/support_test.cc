@@ -171,6 +171,35 @@ TEST(SupportTest, PointsHoldWhatTheyCanBalance) {
   EXPECT_GT(alone.twist[2], 0.0);
 }
 
+// At the limit the friction of a motion is the wrench, which tells the motion however little the
+// wrench exceeds it.
+TEST(SupportTest, AWrenchJustBeyondTheLimitTellsTheMotionThatItBegins) {
+  const Supported made = Of(R"({"friction": 0.4, "load": 5, "radius": 0.4})");
+  const double mass[3] = {1.0, 1.0, 0.16};
+  for (const double omega : {0.0, 0.1, 1.0, 2.5, 7.0, 40.0}) {
+    const double twist[3] = {0.6, -0.8, omega};
+    double wrench[3];
+    made.friction.At(twist, wrench);
+    for (const double excess : {3e-16, 1e-15, 1e-13, 1e-10, 1e-8}) {
+      double push[3];
+      for (int i = 0; i < 3; ++i) push[i] = -(1.0 + excess) * wrench[i];
+      const SupportState alone = made.friction.SolveAlone(mass, push);
+      if (alone.holds == SupportState::kBody) {
+        EXPECT_LT(excess, 1e-14) << "to rounding it may hold";
+        continue;
+      }
+      const double size = std::hypot(alone.twist[0], alone.twist[1]);
+      ASSERT_GT(size, 0.0) << omega << " " << excess;
+      // Behind the limit the motion turns at a rate of 1.
+      const double within = 1e-12 + 30.0 * excess;
+      EXPECT_NEAR(alone.twist[0] / size, 0.6, within) << omega << " " << excess;
+      EXPECT_NEAR(alone.twist[1] / size, -0.8, within) << omega << " " << excess;
+      EXPECT_NEAR(alone.twist[2] / size, omega, (1.0 + omega * omega) * within)
+          << omega << " " << excess;
+    }
+  }
+}
+
 // The conditions of the minimum, at random.
 TEST(SupportTest, TheMotionOfABodyAloneObeysCoulombsLaw) {
   std::mt19937 random(5);

@@ -103,6 +103,56 @@ TEST(CreepingSupportsTest, AGrowingForceMovesLinksOnPoints) {
   for (size_t i = 0; i < 6; ++i) EXPECT_NEAR(final.pose[i], fine.pose[i], 5e-5) << i;
 }
 
+// Two links on discs in a row; a force on the second one turns it about the hinge, and grows until
+// the first one moves too, at 0.29998 s, in a direction that its support tells.
+Scene LinksOnDiscs(double friction, double duration) {
+  return SceneOf(R"({"gravity": [0, 0], "bodies": [
+      {"name": "l0", "shape": {"box": {"size": [0.2, 0.04]}}, "mass": 0.9, "position": [0.1, 0],
+       "support": {"radius": 0.05, "friction": )" +
+                 Text(friction) + R"(}},
+      {"name": "l1", "shape": {"box": {"size": [0.2, 0.04]}}, "mass": 0.68,
+       "position": [0.3, 0], "support": {"friction": 0.19, "load": 3.88, "radius": 0.05}}],
+    "joints": [{"name": "j0", "type": "revolute", "bodies": ["l0", "l1"], "anchor": [0.2, 0]}],
+    "forces": [{"name": "p", "body": "l1", "force": {"time": [0, 0.3, 0.5],
+                "x": [0, -2.787697698194375, -2.787697698194375],
+                "y": [0, 3.9206849079538104, 3.9206849079538104], "interpolation": "linear"}}],
+    "no_contact": [["*", "*"]],
+    "simulation": {"stepping": "event", "dt": 0.02, "duration": )" +
+                 Text(duration) + "}}");
+}
+
+// Corrections of the hinge move the body that turns about it alone.
+TEST(CreepingSupportsTest, ALinkThatItsSupportHoldsStaysToTheBit) {
+  Model<double> model;
+  State<double> initial, final;
+  BuildModel(LinksOnDiscs(0.387, 0.28), &model, &initial);
+  const RolloutReport report = Rollout(model, initial, {}, &final);
+  ASSERT_EQ(report.status, StepStatus::kDone) << report.message;
+  EXPECT_GT(final.pose[5] - initial.pose[5], 0.2);
+  for (size_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(final.pose[i], initial.pose[i]) << i;
+    EXPECT_EQ(final.twist[i], 0.0) << i;
+  }
+}
+
+TEST(CreepingSupportsTest, ADiscThatAForceSlowlyLetsGoHasOneDirection) {
+  const std::vector<std::string> paths = {"bodies/l0/support/friction"};
+  const GradientResult adjoint =
+      testing::Jacobian(LinksOnDiscs(0.387, 0.4), paths, GradientMethod::kAdjoint);
+  const auto angle = [](double friction) {
+    Model<double> model;
+    State<double> initial, final;
+    BuildModel(LinksOnDiscs(friction, 0.4), &model, &initial);
+    const RolloutReport report = Rollout(model, initial, {}, &final);
+    EXPECT_EQ(report.status, StepStatus::kDone) << report.message;
+    return final.pose[2];
+  };
+  for (const double step : {4e-7, 4e-6}) {
+    const double difference = (angle(0.387 + step) - angle(0.387 - step)) / (2.0 * step);
+    EXPECT_NEAR(adjoint.jacobian(2, 0), difference, 1e-3 * std::abs(difference)) << step;
+  }
+}
+
 TEST(CreepingSupportsTest, DerivativesAreThoseOfTheMotion) {
   const Scene scene = StruckChain({0.254, 0.31}, {0.452, 0.093, -0.16}, 0.02);
   const std::vector<std::string> paths = {"bodies/l0/velocity/y", "bodies/l0/support/friction",
