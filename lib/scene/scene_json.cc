@@ -348,7 +348,7 @@ std::shared_ptr<const RecordedPath> SceneReader::ReadPathOf(const JsonReader& re
   return reader.ok() ? std::make_shared<const RecordedPath>(std::move(series)) : nullptr;
 }
 
-// Two names of bodies with `*`; some two different bodies must match them.
+// Two names of bodies with `*`; where one is a name, some two different bodies must match them.
 void SceneReader::ReadPatterns(const JsonReader& reader, std::string* first, std::string* second) {
   if (reader.Size() != 2) return reader.FailExpected("an array of 2 names of bodies");
   std::vector<int> matching[2];
@@ -367,7 +367,10 @@ void SceneReader::ReadPatterns(const JsonReader& reader, std::string* first, std
       return name.FailExpected("a name or pattern of a body (" + BodyList() + ")");
     }
   }
-  if (matching[0].size() == 1 && matching[0] == matching[1]) {
+  // Two patterns of one body's scene name no pair, and no body twice.
+  const bool are_patterns =
+      first->find('*') != std::string::npos && second->find('*') != std::string::npos;
+  if (!are_patterns && matching[0].size() == 1 && matching[0] == matching[1]) {
     reader.Fail("expected two different bodies, got \"" + scene_->bodies[matching[0][0]].name +
                 "\" twice");
   }

@@ -94,6 +94,13 @@ struct SupportPoint {
   }
 };
 
+/// Whether a support keeps its body's centre of mass where it is: it holds all of the body, or its
+/// friction acts there.
+inline bool HoldsCentre(const SupportIndex& support, const SupportState& at) {
+  return at.holds == SupportState::kBody ||
+         (support.kind == SupportIndex::kCentre && at.holds != SupportState::kNothing);
+}
+
 /// The dissipation of a body's support at a pose, in doubles.
 class SupportFriction {
  public:

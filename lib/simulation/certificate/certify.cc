@@ -304,6 +304,29 @@ void RolloutCertifier::AddServos(const Model<double>& model, long step, const St
   }
 }
 
+// By events a servo that stays on its bound, as one that holds a load with all that it has, is at a
+// kink: beside it, it has its stiffness on one side and none on the other. One that passes its bound
+// is not, as its effort does not jump there.
+void RolloutCertifier::AddServosOnBound(const Model<double>& model, long step,
+                                        const Segment& segment) {
+  const ModelStructure& s = *model.structure;
+  if (!(segment.length > kStaysOnBound * s.settings.dt)) return;
+  const double end = segment.time + segment.length;
+  for (int k = 0; k < static_cast<int>(s.servos.size()); ++k) {
+    if (!s.servos[k].has_limit || !IsServoOn(model, k, segment.middle)) continue;
+    for (const double sign : {1.0, -1.0}) {
+      const auto is_on = [&](const State<double>& state, double time) {
+        const BoundReserve left = ReserveOf(model, state, k, sign, time, segment.middle);
+        return std::abs(left.value) <= kServoBound * left.terms;
+      };
+      if (!is_on(segment.before, segment.time) || !is_on(segment.after, end)) continue;
+      const ActiveContact contact = ContactOfServo(s, k);
+      AddMargin(0.0, {&s, step, segment.time, 0, &contact, ContactMode::kOpen},
+                "it stays on its bound");
+    }
+  }
+}
+
 // At the length 0 the direction of a spring turns, and its force jumps by twice that of its rest
 // length, at an instant that is no event: what that adds to derivatives is missing.
 void RolloutCertifier::AddSprings(const Model<double>& model, double time,

@@ -101,6 +101,7 @@ class RolloutCertifier {
                  AtKink at_kink = AtKink::kNo);
   void AddJump(double margin, const Place& place, const std::string& what);
   void AddServos(const Model<double>& model, long step, const StepRecord& record);
+  void AddServosOnBound(const Model<double>& model, long step, const Segment& segment);
   void AddSupports(const Model<double>& model, long step, const StepRecord& record);
   void AddSupportsWithoutFriction(const Model<double>& model, const StepRecord& first);
   /// Springs with a rest length whose ends pass through each other.
@@ -178,6 +179,9 @@ class RolloutCertifier {
   void AddUnloaded(const Model<double>& model, long step, const Impulses& impact);
   bool StaysUnloaded(const Model<double>& model, const Impulses& impact, size_t i) const;
   void AddSimultaneous(const Model<double>& model, long step, const Impulses& impact);
+  /// Whether a direction changes the gap of a contact at the run's start.
+  bool MovesGap(const Model<double>& model, const State<double>& start,
+                const ActiveContact& contact) const;
   double SinceLastStrike(const ModelStructure& s, const Impulses& impact,
                          const std::vector<size_t>& approaching) const;
   Coupling CouplingWithStrikes(const Model<double>& model, const Impulses& impact) const;
@@ -276,6 +280,7 @@ class RolloutCertifier {
     std::string what;
     bool is_touch = false;
     bool rebounds = false;  ///< an impact with a restitution
+    bool of_joint = false;  ///< the end of a joint, whose bodies part where it comes first
   };
   std::vector<BesideJump> beside_jumps_;
   // The three of all islands, while closed_, loaded_ and struck_at_ are those of one.

@@ -65,7 +65,9 @@ double SlipOf(const Model<double>& model, const State<double>& state,
 bool StrikesBeforeOrBehind(const Model<double>& model, const Segment& segment,
                            const LoadJump& jump) {
   const ActiveContact& contact = segment.event_contact;
-  if (!contact.IsOfShapes() || (jump.driven != contact.a && jump.driven != contact.b)) return false;
+  if (contact.IsPureFriction() || (jump.driven != contact.a && jump.driven != contact.b)) {
+    return false;
+  }
   const double time = segment.time + segment.length;
   const auto approach = [&](double inside) {
     State<double> state = segment.after;
@@ -231,9 +233,9 @@ void RolloutCertifier::AddJumpsOfLoads(const Model<double>& model, const Segment
     if (is_touch && (jump.is_of_a_joint || StrikesBeforeOrBehind(model, segment, jump))) {
       AddJump(distance, place, what);
     }
-    beside_jumps_.push_back({island_ != nullptr ? island_->InWhole(event) : event, distance,
-                             place.step, place.time, what, is_touch,
-                             is_touch && RestitutionOf(model, event).value > 0.0});
+    beside_jumps_.push_back(
+        {island_ != nullptr ? island_->InWhole(event) : event, distance, place.step, place.time,
+         what, is_touch, is_touch && RestitutionOf(model, event).value > 0.0, jump.is_of_a_joint});
   }
 }
 
@@ -247,9 +249,7 @@ void RolloutCertifier::AddBesideJumps(const Model<double>& model, const Segment&
     if (contact.is_support) {
       for (size_t k = 0; k < segment.before.supports.size(); ++k) {
         if (s.supports[k].body == contact.a) {
-          const int holds = segment.before.supports[k].holds;
-          return holds == SupportState::kBody ||
-                 (holds != SupportState::kNothing && s.supports[k].kind == SupportIndex::kCentre);
+          return HoldsCentre(s.supports[k], segment.before.supports[k]);
         }
       }
       return false;
@@ -268,7 +268,7 @@ void RolloutCertifier::AddBesideJumps(const Model<double>& model, const Segment&
     if (contact.a < 0 || contact.b < 0) return false;
     // A motion from the event to the jump tells nothing of what comes after it.
     if (!(segment.length > 2.0 * beside.distance * s.settings.dt)) return false;
-    if (beside.rebounds || !rests(beside, contact)) {
+    if (beside.rebounds || beside.of_joint || !rests(beside, contact)) {
       AddMargin(beside.distance, {&s, beside.step, beside.time, 0, &contact, ContactMode::kOpen},
                 beside.what);
     }
@@ -389,6 +389,7 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
                                   EventDerivative* derivative, Segment* segment) {
   const ModelStructure& s = *model.structure;
   AddSprings(model, segment->time, segment->before, segment->after);
+  AddServosOnBound(model, step, *segment);
   // Of the shares that redundant contacts can have of the forces, one with the fewest at a limit.
   SolvedNode& start = segment->stages[0];
   const ContactSolution<double> share = ShareAtStart(model, *segment, &inner_impulses_);
@@ -416,7 +417,9 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
       if (!motion_follows) {
         add_margin(largest > rounding ? normal / largest : 0.0, "normal force");
       }
-      if (normal > std::max(kLoaded * largest, rounding)) {
+      const double surely =
+          SupportsHoldBoth(s, segment->before, contact) ? start.solution.normal_impulse[i] : normal;
+      if (surely > std::max(kLoaded * largest, rounding)) {
         loaded_.push_back(contact);
       }
     }

@@ -144,6 +144,17 @@ bool RolloutCertifier::KeepsSide(const Model<double>& model, const ActiveContact
   return true;
 }
 
+bool RolloutCertifier::MovesGap(const Model<double>& model, const State<double>& start,
+                                const ActiveContact& contact) const {
+  LocalJacobianScratch scratch;
+  std::vector<JacobianEntry> gap;
+  AddGapGradient(model, start, contact, &scratch, &gap);
+  for (Eigen::Index c = 0; c < Directions().cols(); ++c) {
+    if (Moves(gap, Directions(), c)) return true;
+  }
+  return false;
+}
+
 // Whether a contact sticks at its limit as the run starts, slides in the first motion, and either
 // some direction changes its slip at the start, which slides at once in either direction; or beside
 // the start it begins to slide a little later, and the event splits the motion.

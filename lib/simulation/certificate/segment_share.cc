@@ -29,4 +29,19 @@ ContactSolution<double> ShareAtStart(const Model<double>& model, const Segment& 
   return share;
 }
 
+bool SupportsHoldBoth(const ModelStructure& structure, const State<double>& state,
+                      const ActiveContact& contact) {
+  if (state.supports.empty()) return false;
+  const auto is_held = [&](int body) {
+    if (structure.bodies[body].block < 0) return true;
+    for (size_t k = 0; k < state.supports.size(); ++k) {
+      if (structure.supports[k].body == body) {
+        return state.supports[k].holds == SupportState::kBody;
+      }
+    }
+    return false;
+  };
+  return is_held(contact.a) && is_held(contact.b);
+}
+
 }  // namespace tangible

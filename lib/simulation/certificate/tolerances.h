@@ -76,6 +76,8 @@ inline constexpr double kSpeedRounding = 1e-13;
 inline constexpr double kOpeningSpeed = 1e-4;
 /// Of the parameter, at least 1: the largest change of a parameter.
 inline constexpr double kOfParameter = 1e-3;
+/// Of a step: a shorter motion does not tell whether a servo stays on its bound.
+inline constexpr double kStaysOnBound = 0.1;
 /// Of the friction at rest: a smaller loss of friction by sliding is none.
 inline constexpr double kNoDecay = 1e-9;
 /// Of the slip as it was: a smaller slip counts as ended.

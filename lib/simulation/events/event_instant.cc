@@ -423,7 +423,16 @@ bool EventStepper::Rattles(const Model<double>& model, const ActiveContact& cont
 
 double EventStepper::ReturnSpeed(const Model<double>& model, const State<double>& state,
                                  const ActiveContact& contact) const {
-  double acceleration = std::hypot(model.parameters[kGravityX], model.parameters[kGravityY]);
+  const ModelStructure& s = *model.structure;
+  double acceleration =
+      std::max(std::hypot(model.parameters[kGravityX], model.parameters[kGravityY]),
+               search_.load_speed() / s.settings.dt);
+  for (const SupportIndex& support : s.supports) {
+    if (support.body != contact.a && support.body != contact.b) continue;
+    const double* x = &model.parameters[support.numbers];
+    const double friction = x[SupportIndex::kFriction] * x[SupportIndex::kLoad];
+    acceleration = std::max(acceleration, friction / model.parameters[s.bodies[support.body].mass]);
+  }
   const double size = search_.lengths().Size(contact.a, contact.b);
   if (contact.joint >= 0 && size > 0.0 && model.structure->joints[contact.joint].is_angular) {
     acceleration /= size;  // rad/s²

@@ -29,7 +29,7 @@ class LoadScan {
     for (const ForceIndex& force : s_.forces) Force(force);
     for (const SpringIndex& spring : s_.springs) Spring(spring);
     for (const JointIndex& joint : s_.joints) {
-      if (!IsReleased(s_, state_, joint)) Joint(joint);
+      if (!IsReleased(s_, state_, joint) || EndsAtStart(joint)) Joint(joint);
     }
     for (const PathIndex& path : s_.paths) Path(path);
     for (int k = 0; k < static_cast<int>(s_.servos.size()); ++k) Servo(k);
@@ -38,6 +38,11 @@ class LoadScan {
 
  private:
   double Number(int index) const { return model_.parameters[index]; }
+
+  // The friction of a joint that ends as the step begins has left the speeds there.
+  bool EndsAtStart(const JointIndex& joint) const {
+    return joint.until >= 0 && IsSameInstant(s_, Number(joint.until), from_);
+  }
 
   // The largest magnitude of a signal's column within the step.
   double Largest(const Signal& signal, const std::vector<double>& column) const {

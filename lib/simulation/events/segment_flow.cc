@@ -95,11 +95,9 @@ double LargestAcceleration(const SolvedNode& node) {
 void KeepHeld(const ModelStructure& s, const std::vector<SupportState>& supports, double size,
               std::vector<double>* motion) {
   for (size_t k = 0; k < supports.size(); ++k) {
-    const bool is_held = supports[k].holds == SupportState::kBody;
-    const bool is_centre = s.supports[k].kind == SupportIndex::kCentre && supports[k].holds == 0;
-    if (!is_held && !is_centre) continue;
+    if (!HoldsCentre(s.supports[k], supports[k])) continue;
     double* const of_body = &(*motion)[3 * static_cast<size_t>(s.bodies[s.supports[k].body].block)];
-    const int count = is_held ? 3 : 2;
+    const int count = supports[k].holds == SupportState::kBody ? 3 : 2;
     const bool is_rounding = std::all_of(of_body, of_body + count, [&](double component) {
       return std::abs(component) <= 16.0 * kSettled * size;
     });

@@ -238,7 +238,8 @@ bool SupportModes::LetGo(const Model<double>& model, State<double>* before) {
     SupportState& at = before->supports[k];
     if (sought_[k] == SupportState::kNothing || at.holds == SupportState::kNothing) continue;
     any = true;
-    if (HasBegun(k)) {
+    // What a driven body pushes may start along that push, at any friction.
+    if (HasBegun(k) && times_let_go_ > 1) {
       GoOn(model, k, before);
       continue;
     }
@@ -572,9 +573,7 @@ bool SupportModes::HasToStop(const Model<double>& model, const Segment& segment)
     const double* twist = &segment.before.twist[3 * static_cast<size_t>(s.supports[k].body)];
     // Where the event of another body is at the instant at which this one stops, its speed may be 0
     // to the bit, and the derivative of its speed is not.
-    const bool is_whole =
-        at.holds == SupportState::kBody || s.supports[k].kind == SupportIndex::kCentre;
-    if (is_whole && speeds_[k] == 0.0 && last_speeds_[k] > 0.0) return true;
+    if (HoldsCentre(s.supports[k], at) && speeds_[k] == 0.0 && last_speeds_[k] > 0.0) return true;
     if (at.holds == SupportState::kBody) {
       if (twist[0] != 0.0 || twist[1] != 0.0 || twist[2] != 0.0) return true;
     } else if (s.supports[k].kind == SupportIndex::kCentre) {
@@ -649,9 +648,7 @@ double SupportModes::LongestOf(const Model<double>& model, int k, const Segment&
   const BodyIndex& body = s.bodies[support.body];
   const SupportState& at = segment.before.supports[k];
   const double* twist = &segment.before.twist[3 * static_cast<size_t>(support.body)];
-  const bool is_held =
-      at.holds == SupportState::kBody || (support.kind == SupportIndex::kCentre && at.holds == 0);
-  if (courses_[k] == Course::kFree || is_held) return HUGE_VAL;
+  if (courses_[k] == Course::kFree || HoldsCentre(support, at)) return HUGE_VAL;
   friction_.Set(model, segment.before, support, 1.0);
   const double speed = SpeedOfPart(friction_, SupportState::kBody, twist);
   const double size = SpeedOfPart(friction_, SupportState::kBody, acceleration);

@@ -136,5 +136,43 @@ TEST(DrivenPairsTest, PivotsThatAreShakenTogether) {
   ExpectOthersAgree(scene, kDelays, result);
 }
 
+// A block on a table that two fingers push, of which the second one starts a little later: their
+// inelastic impacts end in both contacts at rest, without gravity.
+Scene TwoFingers(double y, double later) {
+  const auto finger = [](const std::string& name, double at, double delay) {
+    return R"({"name": ")" + name + R"(", "kinematic": true, "friction": 0.3,
+               "shape": {"circle": {"radius": 0.02}}, "motion": {"delay": )" +
+           Text(delay) + R"(, "time": [0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6],
+               "x": [-0.124, -0.111, -0.077, -0.029, 0.026, 0.026, 0.026]},
+               "position": [-0.124, )" +
+           Text(at) + "]}";
+  };
+  return SceneOf(R"({"no_contact": [["first", "second"]], "bodies": [)" +
+                 finger("first", y, 0.013) + ", " + finger("second", -0.071, 0.013 + later) +
+                 R"(, {"name": "b", "shape": {"box": {"size": [0.2, 0.2]}}, "mass": 1.23,
+                       "position": [0, 0], "friction": 0.3, "support": {"friction": 0.3, "points":
+                       [[0.08, 0.08], [-0.08, 0.08], [-0.08, -0.08], [0.08, -0.08]]}})" +
+                 EventsFor(0.01, 0.5));
+}
+
+TEST(DrivenPairsTest, TwoFingersPushABlock) {
+  for (const double y : {0.057, 0.071}) {
+    for (const double later : {0.0141, 0.0142, 0.015}) {
+      const Scene scene = TwoFingers(y, later);
+      Model<double> model;
+      State<double> initial;
+      BuildModel(scene, &model, &initial);
+      State<double> final;
+      const RolloutReport report = Rollout(model, initial, {}, &final);
+      ASSERT_EQ(report.status, StepStatus::kDone) << later << " " << report.message;
+      EXPECT_LT(report.events, 250) << y << " " << later;
+      EXPECT_GT(final.pose[6], 0.14);
+    }
+  }
+  const GradientResult result =
+      Jacobian(TwoFingers(0.057, 0.0141), kDelays, GradientMethod::kAdjoint);
+  ExpectOthersAgree(TwoFingers(0.057, 0.0141), kDelays, result);
+}
+
 }  // namespace
 }  // namespace tangible
