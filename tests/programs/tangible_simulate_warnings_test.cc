@@ -219,6 +219,22 @@ TEST_F(WarningsTest, AStartBeyondALimitIsNamed) {
   EXPECT_EQ(Simulate(scene("0"), "--out=/dev/null").error.find("limit"), std::string::npos);
 }
 
+// A hand that moves evenly carries a bob, which begins at rest or with the hand's speed.
+TEST_F(WarningsTest, WhatHangsOnAMovingBodyAndBeginsAtRestIsNamed) {
+  const auto scene = [](const std::string& velocity) {
+    return R"({"bodies": [
+        {"name": "hand", "kinematic": true, "position": [0, 0],
+         "motion": {"interpolation": "linear", "time": [-1, 2], "x": [-1, 2]}},
+        {"name": "bob", "mass": 1, "inertia": 0.1, "position": [0, -1], "velocity": )" +
+           velocity + R"(}], "joints": [{"name": "pin", "type": "revolute",
+        "bodies": ["bob", "hand"], "anchor": [0, 0]}],
+        "simulation": {"dt": 0.01, "duration": 0.1, "stepping": "event"}})";
+  };
+  ExpectOneLine(Simulate(scene("[0, 0]")), 0,
+                "begins with joint pin, to body hand of given motion, moving apart at 1 m/s");
+  EXPECT_EQ(Simulate(scene("[1, 0]")).error, "");
+}
+
 // A disc that falls beside a half-pipe is behind its upright wall, and is pushed in through it.
 TEST_F(WarningsTest, WhatComesBehindALinePastItsEndIsNamed) {
   const auto at = [](const char* x) {

@@ -474,4 +474,17 @@ bool ContactSearch::GiveUpRebounds(const Model<double>& model, double h, int con
   return any;
 }
 
+void ContactSearch::KeepGivenUp(const Model<double>& model, double h,
+                                const std::vector<ActiveContact>& earlier,
+                                std::vector<ActiveContact>* contacts) {
+  for (ActiveContact& c : *contacts) {
+    if (c.law != ContactLaw::kRestitution) continue;
+    const bool is_given_up =
+        std::any_of(earlier.begin(), earlier.end(), [&](const ActiveContact& other) {
+          return other.SameAs(c) && other.law != ContactLaw::kRestitution;
+        });
+    if (is_given_up) c.law = GapLaw(c.gap, h, model.structure->settings);
+  }
+}
+
 }  // namespace tangible

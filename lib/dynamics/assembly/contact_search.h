@@ -48,6 +48,10 @@ class ContactSearch {
   /// between two would have to rebound from one and may not move towards the other.
   static bool GiveUpRebounds(const Model<double>& model, double h, int contact,
                              std::vector<ActiveContact>* contacts);
+  /// What an earlier solve of the step has given up stays so.
+  static void KeepGivenUp(const Model<double>& model, double h,
+                          const std::vector<ActiveContact>& earlier,
+                          std::vector<ActiveContact>* contacts);
 
  private:
   void AddReached(const Model<double>& model, const State<double>& state, double h,

@@ -37,6 +37,7 @@
 
 #include "tangible/dynamics/assembly/assembly.h"
 #include "tangible/dynamics/elements/joint_coupling_inl.h"
+#include "tangible/dynamics/model/tolerances.h"
 
 namespace tangible::internal {
 
@@ -293,10 +294,29 @@ class Equations {
       rates.normal = LawConstant(contact.law, rows.geometry.gap, at_.h, b_.Restitution(i),
                                  b_.Approach(contact, rows), s_.settings);
       if (contact.is_motor) rates.tangent = rows.slide;
+      if (LeavesOverlap(contact)) rates.normal = T(0.0);
     } else if constexpr (kLevel == Level::kCorrection) {
       rates.normal = contact.law == ContactLaw::kRecovery ? T(-at_.recovery) : rows.geometry.gap;
     }
     b_.Contact(i, contact, rows, rates.normal, rates.tangent);
+  }
+
+  /// Whether two bodies overlap by the error of a step, which turns them against each other, and
+  /// are held by their supports: to push them apart would take all that both can hold.
+  bool LeavesOverlap(const ActiveContact& contact) const {
+    const bool is_slight =
+        contact.gap < 0.0 && contact.gap > -kHeldOverlap * s_.settings.contact_margin;
+    if (s_.supports.empty() || !is_slight || !contact.IsOfShapes()) return false;
+    const auto is_held = [&](int body) {
+      if (s_.bodies[body].block < 0) return true;
+      for (int k = 0; k < static_cast<int>(s_.supports.size()); ++k) {
+        if (s_.supports[k].body != body) continue;
+        const SupportState* at = b_.SupportAt(k);
+        return at != nullptr && at->holds == SupportState::kBody;
+      }
+      return false;
+    };
+    return is_held(contact.a) && is_held(contact.b);
   }
 
   /// The share that coordinate k has in a limit of a coupling, as a limit of the coupled joint.

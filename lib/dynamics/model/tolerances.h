@@ -59,6 +59,8 @@ inline constexpr double kHeldPoint = 1e-10;
 /// so that it needs no more force than it must. The square of that share is far below the tolerance
 /// of its limit, and a proximal step still gains five digits.
 inline constexpr double kSupportGive = 1e5;
+/// Of `contact_margin`: bodies that are held by their supports, and overlap by less, stay so.
+inline constexpr double kHeldOverlap = 1e-3;
 /// Of the speed that a body would have without its support: where all points are faster the
 /// dissipation is smooth enough for Newton's method without smoothing it.
 inline constexpr double kSlowPoint = 1e-4;

@@ -7,12 +7,14 @@
 #include <utility>
 
 #include "tangible/dynamics/elements/servo.h"
+#include "tangible/dynamics/jacobian/contact_gradient.h"
 #include "tangible/dynamics/model/driven_bodies.h"
 #include "tangible/lcp/system/contact_conditioning.h"
 #include "tangible/simulation/certificate/approach_inl.h"
 #include "tangible/simulation/certificate/certify_place_inl.h"
 #include "tangible/simulation/certificate/duality.h"
 #include "tangible/simulation/certificate/feature_ties.h"
+#include "tangible/simulation/certificate/segment_share.h"
 #include "tangible/simulation/certificate/support_slacks.h"
 #include "tangible/simulation/certificate/tolerances.h"
 #include "tangible/simulation/derivatives/rollout_directional.h"
@@ -267,7 +269,21 @@ void RolloutCertifier::AddFeatures(const Model<double>& model, const StepRecord&
 
 void RolloutCertifier::AddSupports(const Model<double>& model, long step,
                                    const StepRecord& record) {
+  // What bodies at rest give each other is a share: one beyond the limit, where the friction was
+  // found to settle, says nothing of others.
+  const auto is_squeezed = [&](int body) {
+    for (size_t i = 0; i < record.contacts.size(); ++i) {
+      const ActiveContact& contact = record.contacts[i];
+      if (contact.IsOfShapes() && record.solution.modes[i] != ContactMode::kOpen &&
+          (contact.a == body || contact.b == body) &&
+          SupportsHoldBoth(*model.structure, record.before, contact)) {
+        return true;
+      }
+    }
+    return false;
+  };
   ForEachSupportSlack(model, record, [&](const SupportSlack& slack) {
+    if (slack.margin == 0.0 && !slack.slides && is_squeezed(slack.contact.a)) return;
     AddMargin(slack.margin,
               {model.structure.get(), step, record.time, 0, &slack.contact, ContactMode::kOpen},
               slack.slides ? "sliding" : "sticking");
@@ -305,8 +321,8 @@ void RolloutCertifier::AddServos(const Model<double>& model, long step, const St
 }
 
 // By events a servo that stays on its bound, as one that holds a load with all that it has, is at a
-// kink: beside it, it has its stiffness on one side and none on the other. One that passes its bound
-// is not, as its effort does not jump there.
+// kink: beside it, it has its stiffness on one side and none on the other. One that passes its
+// bound is not, as its effort does not jump there.
 void RolloutCertifier::AddServosOnBound(const Model<double>& model, long step,
                                         const Segment& segment) {
   const ModelStructure& s = *model.structure;
@@ -370,12 +386,55 @@ void RolloutCertifier::AddDiscreteMap(const Model<double>& model, long step,
   if (certificate_.discrete_map.empty()) {
     certificate_.discrete_map = EdgeThatLetsGo(model, step, record);
   }
+  if (certificate_.discrete_map.empty() && step == 0) {
+    certificate_.discrete_map = SetOffAtStart(model, record);
+  }
   held_last_.clear();
   for (size_t i = 0; i < record.contacts.size(); ++i) {
     if (record.solution.modes[i] == ContactMode::kSticking) {
       held_last_.push_back(record.contacts[i]);
     }
   }
+}
+
+std::string RolloutCertifier::SetOffAtStart(const Model<double>& model,
+                                            const StepRecord& record) const {
+  const ModelStructure& s = *model.structure;
+  constexpr char kSetOff[] = ", its load sets it off from rest";
+  LocalJacobianScratch scratch;
+  State<double> after = record.before;
+  after.twist = record.new_twist;
+  const auto slips = [&](const State<double>& state, const ActiveContact& contact) {
+    const double slip = SpeedsOf(model, state, contact).slip;
+    return std::abs(slip) > Negligible(model, slip);
+  };
+  for (size_t i = 0; i < record.contacts.size(); ++i) {
+    const ActiveContact& contact = record.contacts[i];
+    if (SlidingSign(record.solution.modes[i]) == 0.0) continue;
+    if (slips(record.before, contact) || !slips(after, contact)) continue;
+    std::vector<JacobianEntry> gradient;
+    AddSlipGradient(model, record.before, contact, &scratch, &gradient);
+    if (MovesAny(gradient)) return PlaceText(s, 0, record.time, contact) + kSetOff;
+  }
+  for (size_t k = 0; k < record.before.supports.size(); ++k) {
+    const int body = s.supports[k].body;
+    const double* before = &record.before.twist[3 * static_cast<size_t>(body)];
+    const double* after = &record.new_twist[3 * static_cast<size_t>(body)];
+    const auto moves = [](const double* twist) {
+      return twist[0] != 0.0 || twist[1] != 0.0 || twist[2] != 0.0;
+    };
+    if (moves(before) || !moves(after)) continue;
+    ActiveContact contact;
+    contact.is_support = true;
+    contact.a = body;
+    contact.b = s.world();
+    for (int i = 0; i < 3; ++i) {
+      if (MovesAny({{0, s.TwistVariable(body, i), 1.0}})) {
+        return PlaceText(s, 0, record.time, contact) + kSetOff;
+      }
+    }
+  }
+  return "";
 }
 
 std::string RolloutCertifier::EdgeThatLetsGo(const Model<double>& model, long step,

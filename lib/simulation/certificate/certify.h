@@ -108,6 +108,9 @@ class RolloutCertifier {
   void AddSprings(const Model<double>& model, double time, const State<double>& before,
                   const State<double>& after);
   void AddDiscreteMap(const Model<double>& model, long step, const StepRecord& record);
+  /// Of a body at rest whose load moves it in the first step: set off against it, it has the
+  /// friction of the other direction first. Empty where no direction changes its speed there.
+  std::string SetOffAtStart(const Model<double>& model, const StepRecord& record) const;
   /// An edge of a force's window, as a parameter, within a step in which friction lets go: it acts
   /// against the part that the force has of the step, where in the motion it does so from the edge
   /// on. Empty where there is none.
@@ -179,9 +182,12 @@ class RolloutCertifier {
   void AddUnloaded(const Model<double>& model, long step, const Impulses& impact);
   bool StaysUnloaded(const Model<double>& model, const Impulses& impact, size_t i) const;
   void AddSimultaneous(const Model<double>& model, long step, const Impulses& impact);
-  /// Whether a direction changes the gap of a contact at the run's start.
+  /// Whether a direction changes the gap of a contact at the run's start; or that, or its speed.
   bool MovesGap(const Model<double>& model, const State<double>& start,
                 const ActiveContact& contact) const;
+  bool MovesAtStart(const Model<double>& model, const State<double>& start,
+                    const ActiveContact& contact) const;
+  bool MovesAny(const std::vector<JacobianEntry>& gradient) const;
   double SinceLastStrike(const ModelStructure& s, const Impulses& impact,
                          const std::vector<size_t>& approaching) const;
   Coupling CouplingWithStrikes(const Model<double>& model, const Impulses& impact) const;

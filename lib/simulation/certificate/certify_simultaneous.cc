@@ -180,9 +180,12 @@ void RolloutCertifier::AddUnloaded(const Model<double>& model, long step, const 
     if (c.is_rolling) continue;
     const double before = speed(i);
     const bool loaded = Has(loaded_, c);
-    if (!loaded && impact.solution.normal_impulse[i] > kLoaded * largest &&
-        before >= -Negligible(model, before) &&
-        (impact.time > 0.0 || MovesGap(model, impact.before, c))) {
+    if (!(impact.solution.normal_impulse[i] > kLoaded * largest) ||
+        before < -Negligible(model, before)) {
+      continue;
+    }
+    // As the run starts it has been loaded for no time: what opens it takes it from the impact.
+    if (impact.time > 0.0 ? !loaded : MovesAtStart(model, impact.before, c)) {
       const Place place{model.structure.get(), step, impact.time, i, &c, impact.solution.modes[i]};
       AddJump(0.0, place, "it only touches when another impact moves it");
     }

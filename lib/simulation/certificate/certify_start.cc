@@ -144,15 +144,27 @@ bool RolloutCertifier::KeepsSide(const Model<double>& model, const ActiveContact
   return true;
 }
 
+bool RolloutCertifier::MovesAny(const std::vector<JacobianEntry>& gradient) const {
+  for (Eigen::Index c = 0; c < Directions().cols(); ++c) {
+    if (Moves(gradient, Directions(), c)) return true;
+  }
+  return false;
+}
+
 bool RolloutCertifier::MovesGap(const Model<double>& model, const State<double>& start,
                                 const ActiveContact& contact) const {
   LocalJacobianScratch scratch;
   std::vector<JacobianEntry> gap;
   AddGapGradient(model, start, contact, &scratch, &gap);
-  for (Eigen::Index c = 0; c < Directions().cols(); ++c) {
-    if (Moves(gap, Directions(), c)) return true;
-  }
-  return false;
+  return MovesAny(gap);
+}
+
+bool RolloutCertifier::MovesAtStart(const Model<double>& model, const State<double>& start,
+                                    const ActiveContact& contact) const {
+  LocalJacobianScratch scratch;
+  std::vector<JacobianEntry> approach;
+  AddApproachGradient(model, start, contact, &scratch, &approach);
+  return MovesAny(approach) || MovesGap(model, start, contact);
 }
 
 // Whether a contact sticks at its limit as the run starts, slides in the first motion, and either

@@ -136,7 +136,7 @@ const char* WhatChanges(ChoiceKind kind) {
     case ChoiceKind::kGrazing:
       return "a touch that is missed";
     case ChoiceKind::kMiss:
-      return "a touch where bodies passed each other";
+      return "a touch where bodies passed each other, or a bound that was not reached";
   }
   return "";
 }
@@ -293,6 +293,31 @@ void ChoiceWatch::AddServos(const Model<double>& model, long step, const StepRec
     const ActiveContact contact = ContactOfServo(*model.structure, k);
     Push({KeyOf(ChoiceKind::kMode, step, 4 * k + mode, contact), contact, record.time,
           std::abs(limit - std::abs(effort)), limit + std::abs(effort), true});
+  }
+}
+
+void ChoiceWatch::AddReserves(const Model<double>& model, const IslandRecord& island, long step,
+                              const Segment& segment) {
+  const ModelStructure& s = *model.structure;
+  const double end = segment.time + segment.length;
+  if (end > end_ * (1.0 + kSlackRounding)) return;
+  for (int k = 0; k < static_cast<int>(s.servos.size()); ++k) {
+    if (!s.servos[k].has_limit || !IsServoOn(model, k, segment.middle)) continue;
+    const ActiveContact contact = island.InWhole(ContactOfServo(s, k));
+    for (const int side : {0, 1}) {
+      const BoundReserve left =
+          ReserveOf(model, segment.after, k, side == 0 ? 1.0 : -1.0, end, segment.middle);
+      const auto [place, is_first] =
+          reserves_.try_emplace(KeyOf(ChoiceKind::kMiss, 0, 2 * k + side, contact));
+      Reserve& last = place->second;
+      const double rounding = kSlackRounding * left.terms;
+      const bool rises = !is_first && left.value > last.choice.slack + rounding;
+      const bool same = !is_first && std::abs(left.value - last.choice.slack) <= rounding;
+      if (rises && last.falls && last.choice.slack > rounding) Push(last.choice);
+      last.falls = !rises && (!same || last.falls);
+      last.choice = {KeyOf(ChoiceKind::kMiss, step, 2 * k + side, contact), contact, end,
+                     left.value, left.terms};
+    }
   }
 }
 
@@ -487,6 +512,7 @@ bool EndsAtEdge(const Model<double>& model, const Segment& segment) {
 void ChoiceWatch::AddSegment(const Model<double>& model, const IslandRecord& island, long step,
                              Segment* segment) {
   if (segment->length > 0.0) {
+    AddReserves(model, island, step, *segment);
     const ContactSolution<double> share = ShareAtStart(model, *segment, &inner_impulses_);
     for (size_t i = 0; i < segment->contacts.size(); ++i) {
       AddForces(model, island, step, *segment, i, share);
@@ -587,6 +613,9 @@ void ChoiceWatch::AddOrder(const Model<double>& model, const IslandRecord& islan
 ChoiceList ChoiceWatch::Finish(const Model<double>& model) {
   for (auto& [key, phase] : phases_) Commit(&phase);
   phases_.clear();
+  for (const auto& [key, left] : reserves_) {
+    if (left.falls && left.choice.slack > kSlackRounding * left.choice.scale) Push(left.choice);
+  }
   const SimulationSettings& settings = model.structure->settings;
   if (settings.stepping == Stepping::kFixed) {
     for (const ForceIndex& force : model.structure->forces) {

@@ -101,10 +101,18 @@ class ChoiceWatch {
     bool begins_to_slide = false;  ///< its slip is 0 at its start, whatever varies
     ChoiceList pending;            ///< in the order of time
   };
+  /// What is left of a servo's limit on one side, at the end of the last motion.
+  struct Reserve {
+    Choice choice;
+    bool falls = true;  ///< to it: from the start on, or from what was left before
+  };
   void AddFixed(const Model<double>& model, long step, Stepper* stepper);
   /// The first step without a joint that ends, and how far the others are from being it.
   void AddReleases(const Model<double>& model, long step, const StepRecord& record);
   void AddServos(const Model<double>& model, long step, const StepRecord& record);
+  /// By events: where what is left of a servo's limit turns around above 0.
+  void AddReserves(const Model<double>& model, const IslandRecord& island, long step,
+                   const Segment& segment);
   void AddLaw(const Model<double>& model, long step, const StepRecord& record, size_t i);
   /// A contact that the step before was too far from its surface to look at.
   void AddApproached(const Model<double>& model, long step, const StepRecord& record, size_t i);
@@ -133,6 +141,7 @@ class ChoiceWatch {
   std::map<ChoiceKey, long> counts_;
   std::vector<ActiveContact> last_contacts_;  ///< of the last fixed step
   std::map<ChoiceKey, double> closed_until_;  ///< s, of each pair
+  std::map<ChoiceKey, Reserve> reserves_;     ///< by side
   InnerImpulses inner_impulses_;
 };
 

@@ -133,7 +133,8 @@ void DiscreteMapWatch::AddSlides(const StepRecord& record) {
   slides_now_.clear();
   for (size_t i = 0; i < record.contacts.size(); ++i) {
     const ActiveContact& contact = record.contacts[i];
-    if (contact.IsPureFriction() || !record.problem.contacts[i].has_friction) continue;
+    const ContactBlock<double>& block = record.problem.contacts[i];
+    if (!block.has_friction && !block.limit_given) continue;
     const double sign = SlidesTo(record, i);
     const Slide* const last =
         Find(&slides_, contact, [&](const Slide& slide) { return slide.contact.SameAs(contact); });
@@ -148,6 +149,36 @@ void DiscreteMapWatch::AddSlides(const StepRecord& record) {
   }
   Order(&slides_now_);
   slides_.swap(slides_now_);
+}
+
+void DiscreteMapWatch::AddSupportSlides(const Model<double>& model, const StepRecord& record) {
+  const ModelStructure& s = *model.structure;
+  if (record.before.supports.size() != s.supports.size()) return;
+  support_slides_.resize(s.supports.size());
+  for (size_t k = 0; k < s.supports.size(); ++k) {
+    const int body = s.supports[k].body;
+    support_.Set(model, record.before, s.supports[k], 1.0);
+    if (!(support_.limit() > 0.0)) continue;
+    SupportSlide& last = support_slides_[k];
+    if (HoldsCentre(s.supports[k], record.before.supports[k])) {
+      // As for contacts, one step at rest may lie between a slip and the one back.
+      if (std::exchange(last.ended, true)) last.twist = {};
+      continue;
+    }
+    const double* v = &record.new_twist[3 * static_cast<size_t>(body)];
+    const double arm = support_.arm();
+    const double product =
+        v[0] * last.twist[0] + v[1] * last.twist[1] + arm * arm * v[2] * last.twist[2];
+    if (product < 0.0) {
+      ActiveContact contact;
+      contact.is_support = true;
+      contact.a = body;
+      contact.b = s.world();
+      changes_.push_back({ContactChange::Kind::kReversed, contact});
+    }
+    std::copy_n(v, 3, last.twist.begin());
+    last.ended = false;
+  }
 }
 
 const std::vector<ContactChange>& DiscreteMapWatch::AddStep(const Model<double>& model,
@@ -187,6 +218,7 @@ const std::vector<ContactChange>& DiscreteMapWatch::AddStep(const Model<double>&
   Order(&now_);
   last_.swap(now_);
   AddSlides(record);
+  AddSupportSlides(model, record);
   first_ = false;
   return changes_;
 }

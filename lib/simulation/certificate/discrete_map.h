@@ -2,8 +2,8 @@
 #pragma once
 //
 // Where the derivative of a run by fixed steps is that of the discrete map x_k+1 = F(x_k, p) and
-// not of the motion: where a restitution acts, a contact or limit is made or broken, or a slip of
-// a contact turns back.
+// not of the motion: where a restitution acts, a contact or limit is made or broken, or a slip
+// turns back: of a contact, of its rolling, of a joint with friction or a motor, or of a support.
 //
 // The motion has the event at a time t*(p), and the derivative of the positions jumps there by
 // (v⁻ − v⁺) dt*/dp. The discrete map has it at a step, which does not follow p. After an impact
@@ -21,9 +21,11 @@
 // and a₂ after the instant at which its speed is 0, and the motion's derivative of the speed by an
 // earlier one is a₂ / a₁ from then on. The map's is 1, or 0 where a step ends at rest meanwhile.
 
+#include <array>
 #include <string>
 #include <vector>
 
+#include "tangible/dynamics/elements/support.h"
 #include "tangible/dynamics/model/lengths.h"
 #include "tangible/simulation/stepping/step.h"
 
@@ -70,11 +72,19 @@ class DiscreteMapWatch {
     bool ended = false;
   };
   void AddSlides(const StepRecord& record);
+  /// The same of supports, by the twists of their bodies: against the last one in all.
+  struct SupportSlide {
+    std::array<double, 3> twist{};  ///< 0: it did not slide
+    bool ended = true;
+  };
+  void AddSupportSlides(const Model<double>& model, const StepRecord& record);
 
   Lengths lengths_;
   bool first_ = true;
   std::vector<Touch> last_, now_;  // ordered by their bodies
   std::vector<Slide> slides_, slides_now_;
+  std::vector<SupportSlide> support_slides_;
+  SupportFriction support_;
   std::vector<size_t> without_last_;  // closed contacts of this step that were not in the last
   std::vector<ContactChange> changes_;
 };

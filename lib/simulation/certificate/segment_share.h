@@ -15,8 +15,8 @@ namespace tangible {
 ContactSolution<double> ShareAtStart(const Model<double>& model, const Segment& segment,
                                      InnerImpulses* inner_impulses);
 
-/// Whether the bodies of a contact are at rest on supports, or do not move at all: these may squeeze
-/// it, and need not.
+/// Whether the bodies of a contact are at rest on supports, or do not move at all: these may
+/// squeeze it, and need not.
 bool SupportsHoldBoth(const ModelStructure& structure, const State<double>& state,
                       const ActiveContact& contact);
 

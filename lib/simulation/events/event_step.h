@@ -232,8 +232,8 @@ class EventStepper {
   bool IsInelastic(const Model<double>& model, const ActiveContact& contact) const {
     return counts_.Of(contact) > model.structure->settings.max_events_per_step;
   }
-  /// The speed below which gravity, the loads of the step or a support's friction bring a contact (a
-  /// limit) back before it has left the touching tolerance, m/s (of an angle's rad/s).
+  /// The speed below which gravity, the loads of the step or a support's friction bring a contact
+  /// (a limit) back before it has left the touching tolerance, m/s (of an angle's rad/s).
   double ReturnSpeed(const Model<double>& model, const State<double>& state,
                      const ActiveContact& contact) const;
   /// Of an impact's contacts, the pairs of bodies, and the joints, with events in the step.

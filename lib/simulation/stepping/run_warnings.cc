@@ -6,10 +6,13 @@
 #include <utility>
 
 #include "tangible/dynamics/elements/contact.h"
+#include "tangible/dynamics/elements/joint.h"
+#include "tangible/dynamics/model/driven_bodies.h"
 #include "tangible/dynamics/model/lengths.h"
 #include "tangible/geometry/tolerances.h"
 #include "tangible/simulation/events/tolerances.h"
 #include "tangible/simulation/stepping/energy_watch.h"
+#include "tangible/simulation/stepping/tolerances.h"
 
 namespace tangible {
 namespace {
@@ -42,6 +45,41 @@ std::string BrokenLimitMessage(const Model<double>& model, const State<double>& 
         "recovery_speed, %.3g m/s or rad/s",
         joint.name.c_str(), limit.side > 0.0 ? "low" : "high", -rows.geometry.gap,
         joint.type == JointType::kRevolute ? "rad" : "m", model.structure->settings.recovery_speed);
+    return text;
+  }
+  return "";
+}
+
+// Empty, or the line that names a joint to a body of given motion whose other body does not begin
+// with its speed: "rate" is beside that of bodies that stand.
+std::string LeftBehindMessage(const Model<double>& model, const State<double>& initial) {
+  const ModelStructure& s = *model.structure;
+  for (const JointIndex& joint : s.joints) {
+    if (joint.IsCoupling() || joint.a == s.world() || joint.b == s.world()) continue;
+    const bool a_is_given = s.bodies[joint.a].block < 0;
+    if (a_is_given == (s.bodies[joint.b].block < 0)) continue;
+    const int given = a_is_given ? joint.a : joint.b;
+    const double* v = &initial.twist[3 * static_cast<size_t>(given)];
+    JointRows<double> rows;
+    EvaluateJoint(model, initial, joint, &rows);
+    double apart = 0.0, largest = 0.0;
+    for (int k = 0; k < rows.rows; ++k) {
+      const auto& row = a_is_given ? rows.row_a[k] : rows.row_b[k];
+      const double of_given = row[0] * v[0] + row[1] * v[1] + row[2] * v[2];
+      apart =
+          std::hypot(apart, RelativeSpeed(initial, joint.a, rows.row_a[k], joint.b, rows.row_b[k]));
+      largest = std::hypot(largest, of_given);
+    }
+    const double fastest =
+        LargestGivenSpeed(model, given, 0.0, s.settings.duration, RadiusOf(model, given));
+    if (!(largest > kBegunApart * fastest) || !(apart > kBegunApart * largest)) continue;
+    char text[320];
+    std::snprintf(text, sizeof text,
+                  "the run begins with joint %s, to body %s of given motion, moving apart at %.3g "
+                  "m/s or rad/s: an impulse carries body %s along at once; expected a \"velocity\" "
+                  "of it that the joint allows",
+                  joint.name.c_str(), s.bodies[given].name.c_str(), apart,
+                  s.bodies[a_is_given ? joint.b : joint.a].name.c_str());
     return text;
   }
   return "";
@@ -92,7 +130,7 @@ std::vector<std::string> RunWarnings::Finish(const Model<double>& model,
   if (energy.empty()) energy = EnergyOfSqueeze(model, initial_, final);
   for (std::string line :
        {coordinates_.Message(model), joints_.Message(model), BrokenLimitMessage(model, initial_),
-        FlushStepsMessage(model), behind_, std::move(energy)}) {
+        LeftBehindMessage(model, initial_), FlushStepsMessage(model), behind_, std::move(energy)}) {
     if (!line.empty()) lines.push_back(std::move(line));
   }
   return lines;

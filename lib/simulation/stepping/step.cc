@@ -397,16 +397,20 @@ ContactSystem& Stepper::system() {
 }
 
 ContactSolverReport Stepper::SolveWithContacts(const Model<double>& model,
-                                               const State<double>& state, double h,
+                                               const State<double>& state, double h, Guess from,
                                                StepReport* report) {
   const ModelStructure& structure = *model.structure;
   StepRecord& r = record_;
   search_.SetBounds(model, state, r.problem, scratch_);
   ContactSolverReport solved;
   search_.Find(model, state, h, scratch_, &r.contacts, &r.friction, &r.restitution);
+  if (from == Guess::kSameStep) {
+    ContactSearch::KeepGivenUp(model, h, wider_contacts_, &r.contacts);
+  }
   for (int search = 0; search < kMaxSearches; ++search) {
-    AssembleContacts(model, state, h, r.contacts, r.friction, r.restitution, &scratch_, &r.problem);
-    if (search == 0) {
+    AssembleContacts(model, r.before, h, r.contacts, r.friction, r.restitution, &scratch_,
+                     &r.problem);
+    if (search == 0 && from == Guess::kLastStep) {
       CarryGuess(last_contacts_, last_solution_, Guess::kLastStep);
     } else {
       // The guess is the solution with fewer contacts, with the additional ones open: often that is
@@ -433,7 +437,7 @@ ContactSolverReport Stepper::SolveWithContacts(const Model<double>& model,
     while (!solved.solved &&
            ContactSearch::GiveUpRebounds(model, h, solved.worst_contact, &r.contacts)) {
       ++report->given_up.rebounds_given_up;
-      AssembleContacts(model, state, h, r.contacts, r.friction, r.restitution, &scratch_,
+      AssembleContacts(model, r.before, h, r.contacts, r.friction, r.restitution, &scratch_,
                        &r.problem);
       CarryGuess(last_contacts_, last_solution_, Guess::kLastStep);
       solve();
@@ -467,12 +471,13 @@ ContactSolverReport Stepper::SolveWithContacts(const Model<double>& model,
 ContactSolverReport Stepper::SolveWithSupports(const Model<double>& model,
                                                const State<double>& state, double h,
                                                StepReport* report) {
-  if (model.structure->supports.empty()) return SolveWithContacts(model, state, h, report);
+  Guess from = Guess::kLastStep;
+  if (model.structure->supports.empty()) return SolveWithContacts(model, state, h, from, report);
   StepRecord& r = record_;
   supports_.Start(model, h, r.problem, {}, &r.before);
   for (;;) {
     AssembleWithoutContacts(model, r.before, r.time, h, &r.problem, &scratch_);
-    ContactSolverReport solved = SolveWithContacts(model, state, h, report);
+    ContactSolverReport solved = SolveWithContacts(model, state, h, from, report);
     if (!solved.solved && !supports_.has_given_up() && supports_.Release(model, &r.before))
       continue;
     if (!solved.solved) return solved;
@@ -488,6 +493,10 @@ ContactSolverReport Stepper::SolveWithSupports(const Model<double>& model,
                         ": its friction does not settle";
       return solved;
     }
+    // Other modes may solve the same step: the next solve goes on from these.
+    wider_contacts_ = r.contacts;
+    narrow_solution_ = r.solution;
+    from = Guess::kSameStep;
   }
 }
 

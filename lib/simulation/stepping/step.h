@@ -120,8 +120,9 @@ class Stepper {
   ContactSolverReport SolveContacts(const ContactSolverOptions& options, int* islands);
   // Finds the contacts that the step may close and solves with them; again with more contacts where
   // bodies turn out faster than was assumed.
+  // `from`: the modes of the last step, or of wider_contacts_ with narrow_solution_.
   ContactSolverReport SolveWithContacts(const Model<double>& model, const State<double>& state,
-                                        double h, StepReport* report);
+                                        double h, Guess from, StepReport* report);
   // The same for a scene with supports, again until their friction is that of the new twists.
   ContactSolverReport SolveWithSupports(const Model<double>& model, const State<double>& state,
                                         double h, StepReport* report);

@@ -49,4 +49,8 @@ inline constexpr double kCoupledBeyond = 1e-5;
 /// Of the coordinates of a box: rounding, added to the above.
 inline constexpr double kCoupledRounding = 16.0 * std::numeric_limits<double>::epsilon();
 
+/// Of the speed of a body of given motion at a joint, and of its fastest: where the other body
+/// begins with another one, by more than this, a line says so.
+inline constexpr double kBegunApart = 1e-3;
+
 }  // namespace tangible

@@ -147,5 +147,21 @@ TEST(CertifyTiesTest, WhatTouchesFromTheStartMeetsAtOnce) {
   EXPECT_NE(VerdictAtTie(scene, "bodies/b/position/x"), "trustworthy");
 }
 
+// A double pendulum that gravity presses against the limit of its first hinge, while the second one
+// strikes its own as the run starts: a rate that opens the first one, however small, changes that.
+TEST(CertifyTiesTest, ALimitThatIsPressedAsTheRunStartsJumpsWithItsRate) {
+  const Scene scene = SceneOf(R"({"gravity": [0, -8], "bodies": [
+      {"name": "b0", "mass": 2, "position": [0, 0], "shape": {"circle": {"radius": 0.5}}},
+      {"name": "b1", "mass": 1, "position": [1, -1], "shape": {"circle": {"radius": 0.5}}}],
+    "joints": [
+      {"name": "j0", "type": "revolute", "bodies": ["b0", "world"], "anchor": [-0.5, 0],
+       "limits": [0, 1], "limit_restitution": 1},
+      {"name": "j1", "type": "revolute", "bodies": ["b1", "b0"], "anchor": [0.5, -1], "rate": -1,
+       "limits": [0, 1], "limit_restitution": 0}])" +
+                              ForSeconds(0.03125));
+  EXPECT_TRUE(Says(VerdictAtTie(scene, "joints/j0/rate"), "discontinuous"));
+  EXPECT_FALSE(Says(VerdictAtTie(scene, "joints/j1/rate"), "discontinuous"));
+}
+
 }  // namespace
 }  // namespace tangible

@@ -348,5 +348,53 @@ TEST(DiscreteMapTest, WhateverLetsFrictionGoIsTheMaps) {
   }
 }
 
+// Friction other than of a contact's slip turns back too, with other accelerations on either side.
+TEST(DiscreteMapTest, RollingJointsAndSupportsTurnBack) {
+  const std::string steps = R"(, "simulation": {"dt": 0.01, "duration": )";
+  const std::string slope = R"({"gravity": [-3, -10], "bodies": [
+      {"name": "floor", "static": true, "friction": 0.5, "rolling_friction": 0.01,
+       "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}},
+      {"name": "b", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0, 0.1],
+       "velocity": [1.03, 0], "angular_velocity": -10.3, "friction": 0.5,
+       "rolling_friction": 0.01}])" +
+                            steps;
+  const std::string table = R"({"gravity": [0, 0], "forces": [
+      {"name": "p", "body": "b", "force": [-4, 0]}], "bodies": [
+      {"name": "b", "mass": 1, "inertia": 1, "position": [0, 0], "velocity": [1.03, 0],
+       "support": {"friction": 0.1, "load": 10}}])" +
+                            steps;
+  const std::string lift = R"({"gravity": [0, -10], "bodies": [
+      {"name": "b", "mass": 1, "inertia": 1, "position": [0, 0]}], "joints": [
+      {"name": "j", "type": "prismatic", "bodies": ["b", "world"], "anchor": [0, 0],
+       "axis": [0, 1], "friction": 2, "rate": 1}])" +
+                           steps;
+  for (const std::string& text : {slope, table, lift}) {
+    EXPECT_NE(CertificateOf(text + "0.8}}").discrete_map.find("a slip that turns back"),
+              std::string::npos)
+        << text;
+    ExpectNone(text + "0.05}}");
+  }
+}
+
+// At rest, and moved by its load at once: set off against it, it has the other friction first.
+TEST(DiscreteMapTest, WhatItsLoadSetsOffFromRestIsNamed) {
+  const std::string pushed = R"({"gravity": [5, -10], "bodies": [
+      {"name": "floor", "static": true, "friction": 0.2,
+       "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}},
+      {"name": "b", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "inertia": 1000,
+       "position": [0, 0.1], "friction": 0.2}], "simulation": {"dt": 0.01, "duration": 0.5}})";
+  const std::string table = R"({"gravity": [0, 0], "forces": [
+      {"name": "p", "body": "b", "force": [2, 0]}], "bodies": [
+      {"name": "b", "mass": 1, "inertia": 1, "position": [0, 0],
+       "support": {"friction": 0.1, "load": 10}}], "simulation": {"dt": 0.01, "duration": 0.5}})";
+  for (const std::string& text : {pushed, table}) {
+    const auto verdict = [&](const char* path) {
+      return testing::Jacobian(SceneOf(text), {path}, GradientMethod::kTangent).certificate.verdict;
+    };
+    EXPECT_EQ(verdict("bodies/b/velocity/x").rfind("of the discrete map: ", 0), 0u) << text;
+    EXPECT_EQ(verdict("bodies/b/mass"), "trustworthy") << text;
+  }
+}
+
 }  // namespace
 }  // namespace tangible

@@ -431,5 +431,41 @@ TEST(SupportSharesTest, AnArmThatItsLimitStopsAtOnce) {
   EXPECT_LT(EndOf(scene)[2], 0.5 + 1e-9);
 }
 
+// Nine boxes on a table, 1.7 mm apart, that a disc strikes: they turn against each other, overlap
+// by the error of a step, and come to rest so.
+Scene StruckGrid(double dt) {
+  std::string boxes;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) {
+      boxes += R"(, {"name": "b)" + std::to_string(i) + std::to_string(j) +
+               R"(", "shape": {"box": {"size": [0.2, 0.2]}}, "friction": 0.2, "restitution": 0.1,
+                     "support": {"friction": 0.3, "points": [[0.08, 0.08], [-0.08, 0.08],
+                                                             [-0.08, -0.08], [0.08, -0.08]]},
+                     "mass": )" +
+               test_scenes::Text(0.5 + 0.01 * i + 0.013 * j) + R"(, "position": [)" +
+               test_scenes::Text(0.2017 * i) + ", " + test_scenes::Text(0.2017 * j) + "]}";
+    }
+  }
+  return SceneOf(R"({"gravity": [0, 0], "bodies": [
+      {"name": "cue", "shape": {"circle": {"radius": 0.05}}, "mass": 1, "position": [-0.4, 0.073],
+       "velocity": [2, 0], "friction": 0.1, "restitution": 0.3,
+       "support": {"friction": 0.1, "radius": 0.05}})" +
+                 boxes + R"(], "simulation": {"duration": 0.4, "dt": )" + test_scenes::Text(dt) +
+                 "}}");
+}
+
+TEST(SupportSharesTest, AGridOfBoxesThatIsStruckComesToRest) {
+  for (const double dt : {0.01, 0.005}) {
+    Model<double> model;
+    State<double> state, final;
+    BuildModel(StruckGrid(dt), &model, &state);
+    const RolloutReport report = Rollout(model, state, {}, &final);
+    ASSERT_EQ(report.status, StepStatus::kDone) << dt << " " << report.message;
+    EXPECT_LE(report.residual, 1e-10) << dt;
+    EXPECT_GT(final.pose[3], 1e-3) << "the first box has moved";
+    EXPECT_EQ(final.twist[3 * 9], 0.0) << "and the last one rests";
+  }
+}
+
 }  // namespace
 }  // namespace tangible
