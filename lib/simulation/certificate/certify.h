@@ -145,6 +145,7 @@ class RolloutCertifier {
   void AddStoppedDead(const Model<double>& model, long step, const Segment& segment);
   void AddSegment(const Model<double>& model, long step, EventDerivative* derivative,
                   Segment* segment);
+  void AddHeldSupports(const Model<double>& model, long step, const Segment& segment);
   void AddFriction(const CoefficientSource& friction, const Place& place);
   void AddEnd(const Model<double>& model, long step, const EventRecord& record);
   /// The reads after so many steps.

@@ -417,9 +417,7 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
       if (!motion_follows) {
         add_margin(largest > rounding ? normal / largest : 0.0, "normal force");
       }
-      const double surely =
-          SupportsHoldBoth(s, segment->before, contact) ? start.solution.normal_impulse[i] : normal;
-      if (surely > std::max(kLoaded * largest, rounding)) {
+      if (SureNormal(s, *segment, i, share) > std::max(kLoaded * largest, rounding)) {
         loaded_.push_back(contact);
       }
     }
@@ -441,14 +439,7 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
     AddFriction(friction, place);
   }
   AddStoppedDead(model, step, *segment);
-  ForEachHeldSupport(model, *segment, [&](const SupportSlack& slack) {
-    // What lets go at once is located as an event.
-    const bool goes_at_once = segment->length == 0.0 && segment->event_index == slack.support &&
-                              segment->event == EventKind::kSupportLetsGo;
-    if (motion_follows || goes_at_once) return;
-    AddMargin(slack.margin, {&s, step, segment->time, 0, &slack.contact, ContactMode::kOpen},
-              "sticking");
-  });
+  if (!motion_follows) AddHeldSupports(model, step, *segment);
   if (segment->starts && segment->length == 0.0) {
     start_ = segment;
   } else if (segment->length > 0.0) {
@@ -468,6 +459,19 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
   AddLimitsAtRelease(model, step, *segment);
   AddEventOf(model, step, derivative, segment);
   AddQuality(*model.structure, start.problem, segment->modes, segment->friction, &start.system);
+}
+
+void RolloutCertifier::AddHeldSupports(const Model<double>& model, long step,
+                                       const Segment& segment) {
+  ForEachHeldSupport(model, segment, [&](const SupportSlack& slack) {
+    // What lets go at once is located as an event.
+    const bool goes_at_once = segment.length == 0.0 && segment.event_index == slack.support &&
+                              segment.event == EventKind::kSupportLetsGo;
+    if (goes_at_once) return;
+    AddMargin(slack.margin,
+              {model.structure.get(), step, segment.time, 0, &slack.contact, ContactMode::kOpen},
+              "sticking");
+  });
 }
 
 // Edges at one instant whose order matters.

@@ -44,4 +44,11 @@ bool SupportsHoldBoth(const ModelStructure& structure, const State<double>& stat
   return is_held(contact.a) && is_held(contact.b);
 }
 
+double SureNormal(const ModelStructure& structure, const Segment& segment, size_t contact,
+                  const ContactSolution<double>& share) {
+  return SupportsHoldBoth(structure, segment.before, segment.contacts[contact])
+             ? segment.stages[0].solution.normal_impulse[contact]
+             : share.normal_impulse[contact];
+}
+
 }  // namespace tangible

@@ -20,4 +20,10 @@ ContactSolution<double> ShareAtStart(const Model<double>& model, const Segment& 
 bool SupportsHoldBoth(const ModelStructure& structure, const State<double>& state,
                       const ActiveContact& contact);
 
+/// The normal force that a contact of a segment surely has at its start, N: of bodies that supports
+/// hold that of the segment's solution, which squeezes them by no more than it must, else that of
+/// the share.
+double SureNormal(const ModelStructure& structure, const Segment& segment, size_t contact,
+                  const ContactSolution<double>& share);
+
 }  // namespace tangible
