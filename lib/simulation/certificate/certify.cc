@@ -633,18 +633,15 @@ std::vector<int> NumbersOf(const ModelStructure& structure, const RowMatrixXd& d
 }
 
 // Whether the run has one derivative along each direction, by fixed steps: those along and against
-// it, which are exact, and the tangent, in the modes that were found, are the same where a state is
-// read, or after each step. Then nothing at a kink moves, or whatever moves has the same rates on
-// both sides, or makes up for them: what lands on a step's end, or a step later.
+// it, which are exact, and the tangent, in the modes that were found, are the same after each step.
+// Then nothing at a kink moves, or whatever moves has the same rates on both sides. What differs
+// after one step may be made up for by the next, as of what lands on a step's end or a step later;
+// unrolled Jets, which take their modes step by step, do not follow that.
 class OneDerivative {
  public:
   OneDerivative(const State<double>& initial, const RowMatrixXd& directions,
-                const std::vector<double>& sizes, const std::vector<StateRead>& reads)
-      : reads_(reads),
-        both_(directions),
-        along_(directions),
-        against_(-directions),
-        largest_(directions.cols()) {
+                const std::vector<double>& sizes)
+      : both_(directions), along_(directions), against_(-directions), largest_(directions.cols()) {
     double place = 0.0;
     for (const double x : initial.pose) place = std::max(place, std::abs(x));
     for (const double v : initial.twist) place = std::max(place, std::abs(v));
@@ -654,28 +651,24 @@ class OneDerivative {
     }
   }
 
-  /// Step k − 1 has been done.
-  void AddStep(const Model<double>& model, long k, Stepper* stepper) {
+  void AddStep(const Model<double>& model, Stepper* stepper) {
     if (!holds_) return;
     tangent_.Apply(model, stepper, &both_);
     std::string message;
     holds_ = directional_along_.Apply(model, stepper, &along_, &message) &&
              directional_against_.Apply(model, stepper, &against_, &message);
     const Eigen::Index states = model.structure->ParameterVariable(0);
-    const bool is_read = reads_.empty() || std::any_of(reads_.begin(), reads_.end(),
-                                                       [&](auto& read) { return read.steps == k; });
     for (Eigen::Index c = 0; c < both_.cols() && holds_; ++c) {
       const auto both = both_.col(c).head(states);
       largest_[c] = std::max(largest_[c], both.cwiseAbs().maxCoeff());
       const double apart = std::max((along_.col(c).head(states) - both).cwiseAbs().maxCoeff(),
                                     (against_.col(c).head(states) + both).cwiseAbs().maxCoeff());
-      holds_ = !is_read || apart <= kSameSides * largest_[c];
+      holds_ = apart <= kSameSides * largest_[c];
     }
   }
   bool holds() const { return holds_; }
 
  private:
-  const std::vector<StateRead>& reads_;
   RowMatrixXd both_, along_, against_;
   StepTangent tangent_;
   StepDirectional directional_along_, directional_against_;
@@ -684,14 +677,13 @@ class OneDerivative {
 };
 
 bool HasOneDerivative(const Model<double>& model, const State<double>& initial,
-                      const RowMatrixXd& directions, const std::vector<double>& sizes,
-                      const std::vector<StateRead>& reads) {
-  OneDerivative one(initial, directions, sizes, reads);
+                      const RowMatrixXd& directions, const std::vector<double>& sizes) {
+  OneDerivative one(initial, directions, sizes);
   State<double> final;
   Rollout(
       model, initial,
-      [&](long k, double, const State<double>&, Stepper* stepper) {
-        if (stepper != nullptr) one.AddStep(model, k, stepper);
+      [&](long, double, const State<double>&, Stepper* stepper) {
+        if (stepper != nullptr) one.AddStep(model, stepper);
       },
       &final);
   return one.holds();
@@ -709,7 +701,7 @@ Certificate CertifyDerivative(const Model<double>& model, const State<double>& i
   Certificate certificate = Certify(model, initial, &certifier, &report);
   if (certificate.degenerate_rows > 0 && report.status == StepStatus::kDone &&
       model.structure->settings.stepping == Stepping::kFixed &&
-      HasOneDerivative(model, initial, directions, sizes, reads)) {
+      HasOneDerivative(model, initial, directions, sizes)) {
     certifier.LeaveOutKinks(&certificate);
   }
   if (certificate.degenerate_rows == 0 && report.status == StepStatus::kDone &&

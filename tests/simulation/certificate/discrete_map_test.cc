@@ -396,20 +396,5 @@ TEST(DiscreteMapTest, WhatItsLoadSetsOffFromRestIsNamed) {
   }
 }
 
-// A ball meets another one exactly on a step's end: beside it they meet a step earlier or later,
-// which the next step makes up for.
-TEST(DiscreteMapTest, ALandingOnAStepsEndHasOneDerivative) {
-  const Scene scene = SceneOf(R"({"gravity": [0, 0], "bodies": [
-      {"name": "a", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0, 0],
-       "velocity": [1, 0]},
-      {"name": "b", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0.5, 0]}],
-      "simulation": {"dt": 0.01, "duration": 1}})");
-  const GradientResult result =
-      testing::Jacobian(scene, {"bodies/a/velocity/x", "bodies/a/mass"}, GradientMethod::kTangent);
-  EXPECT_EQ(result.certificate.verdict, "of the discrete map: trustworthy");
-  EXPECT_NEAR(result.jacobian(3, 0), 0.5, 1e-12);
-  EXPECT_NEAR(result.jacobian(3, 1), 0.25, 1e-12);
-}
-
 }  // namespace
 }  // namespace tangible
