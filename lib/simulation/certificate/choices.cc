@@ -305,18 +305,25 @@ void ChoiceWatch::AddReserves(const Model<double>& model, const IslandRecord& is
     if (!s.servos[k].has_limit || !IsServoOn(model, k, segment.middle)) continue;
     const ActiveContact contact = island.InWhole(ContactOfServo(s, k));
     for (const int side : {0, 1}) {
-      const BoundReserve left =
-          ReserveOf(model, segment.after, k, side == 0 ? 1.0 : -1.0, end, segment.middle);
+      const int detail = 2 * k + side;
       const auto [place, is_first] =
-          reserves_.try_emplace(KeyOf(ChoiceKind::kMiss, 0, 2 * k + side, contact));
+          reserves_.try_emplace(KeyOf(ChoiceKind::kMiss, 0, detail, contact));
       Reserve& last = place->second;
-      const double rounding = kSlackRounding * left.terms;
-      const bool rises = !is_first && left.value > last.choice.slack + rounding;
-      const bool same = !is_first && std::abs(left.value - last.choice.slack) <= rounding;
+      const auto choice_at = [&](long number, const State<double>& state, double time) -> Choice {
+        const BoundReserve left =
+            ReserveOf(model, state, k, side == 0 ? 1.0 : -1.0, time, segment.middle);
+        return {KeyOf(ChoiceKind::kMiss, number, detail, contact), contact, time, left.value,
+                left.terms};
+      };
+      if (is_first) last.choice = choice_at(-1, segment.before, segment.time);
+      const Choice now = choice_at(step, segment.after, end);
+      const double rounding = kSlackRounding * now.scale;
+      // Of what stays the same the first instant is the choice, as it is beside a load at rest.
+      if (std::abs(now.slack - last.choice.slack) <= rounding) continue;
+      const bool rises = now.slack > last.choice.slack;
       if (rises && last.falls && last.choice.slack > rounding) Push(last.choice);
-      last.falls = !rises && (!same || last.falls);
-      last.choice = {KeyOf(ChoiceKind::kMiss, step, 2 * k + side, contact), contact, end,
-                     left.value, left.terms};
+      last.falls = !rises;
+      last.choice = now;
     }
   }
 }

@@ -106,6 +106,22 @@ TEST(ValidityRadius, OfABodyThatStopsOnItsSupport) {
 
 // ẋ of the start adds v T: in units of the scene and of the duration the flow is [1 1; 0 1], whose
 // largest singular value is the golden ratio.
+// A servo of 16 N/m holds 16 N of the 16.5 that it has; a target 0.5 / 16 m higher begins beyond.
+TEST(ValidityRadius, OfAServoEndsAtTheBoundThatItDoesNotReach) {
+  constexpr char kHeld[] = R"({"gravity": [0, -8], "bodies": [
+      {"name": "w", "mass": 2, "position": [0, 0], "shape": {"circle": {"radius": 0.125}}}],
+    "joints": [{"name": "p", "type": "prismatic", "bodies": ["w", "world"], "anchor": [0, 0],
+                "axis": [0, 1], "effort": {"target": 1, "stiffness": 16, "limit": 16.5}}],
+    "simulation": {"dt": 0.015625, "duration": 0.5}})";
+  for (const Stepping stepping : {Stepping::kFixed, Stepping::kEvent}) {
+    const Certificate target = CertificateOf(kHeld, "joints/p/effort/target", stepping);
+    EXPECT_NEAR(target.radius[0].up, 0.5 / 16.0, 1e-6);
+    const Certificate limit = CertificateOf(kHeld, "joints/p/effort/limit", stepping);
+    EXPECT_NEAR(limit.radius[0].down, 0.5, 1e-6);
+    EXPECT_TRUE(std::isinf(limit.radius[0].up)) << limit.radius[0].up_where;
+  }
+}
+
 TEST(ValidityRadius, GrowthOfAFreeFlightIsTheGoldenRatio) {
   const Certificate flight = CertificateOf(
       R"({"bodies": [{"name": "ball", "shape": {"circle": {"radius": 0.1}}, "mass": 1,
