@@ -367,7 +367,7 @@ void SceneReader::ReadPatterns(const JsonReader& reader, std::string* first, std
       return name.FailExpected("a name or pattern of a body (" + BodyList() + ")");
     }
   }
-  // Two patterns of one body's scene name no pair, and no body twice.
+  // Two patterns may match one body alone: they name no pair then, and no body twice.
   const bool are_patterns =
       first->find('*') != std::string::npos && second->find('*') != std::string::npos;
   if (!are_patterns && matching[0].size() == 1 && matching[0] == matching[1]) {

@@ -187,7 +187,9 @@ void RolloutCertifier::AddUnloaded(const Model<double>& model, long step, const 
     // As the run starts it has been loaded for no time: what opens it takes it from the impact.
     if (impact.time > 0.0 ? !loaded : MovesAtStart(model, impact.before, c)) {
       const Place place{model.structure.get(), step, impact.time, i, &c, impact.solution.modes[i]};
-      AddJump(0.0, place, "it only touches when another impact moves it");
+      AddJump(0.0, place,
+              loaded ? "it is pressed when another impact moves it"
+                     : "it only touches when another impact moves it");
     }
   }
 }
