@@ -386,7 +386,7 @@ void RolloutCertifier::AddDiscreteMap(const Model<double>& model, long step,
   if (certificate_.discrete_map.empty()) {
     certificate_.discrete_map = EdgeThatLetsGo(model, step, record);
   }
-  if (certificate_.discrete_map.empty() && step == 0) {
+  if (certificate_.discrete_map.empty() && step == 0 && Directions().cols() > 0) {
     certificate_.discrete_map = SetOffAtStart(model, record);
   }
   held_last_.clear();

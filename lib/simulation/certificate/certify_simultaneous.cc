@@ -158,6 +158,24 @@ void RolloutCertifier::AddSimultaneous(const Model<double>& model, long step,
   AddStrikes(s, impact);
 }
 
+namespace {
+
+// Whether both bodies of a contact have no speed, and those that move are on supports, which hold
+// them where they are: their gap is that of the start.
+bool RestsOnSupports(const ModelStructure& s, const State<double>& state,
+                     const ActiveContact& contact) {
+  const auto rests = [&](int body) {
+    const double* v = &state.twist[3 * static_cast<size_t>(body)];
+    if (v[0] != 0.0 || v[1] != 0.0 || v[2] != 0.0) return false;
+    return s.bodies[body].block < 0 ||
+           std::any_of(s.supports.begin(), s.supports.end(),
+                       [&](const SupportIndex& support) { return support.body == body; });
+  };
+  return rests(contact.a) && rests(contact.b);
+}
+
+}  // namespace
+
 // A contact that only touches, without force, takes part in the impact of another contact: with a
 // gap, however small, it would have a separate impact later.
 void RolloutCertifier::AddUnloaded(const Model<double>& model, long step, const Impulses& impact) {
@@ -185,7 +203,11 @@ void RolloutCertifier::AddUnloaded(const Model<double>& model, long step, const 
       continue;
     }
     // As the run starts it has been loaded for no time: what opens it takes it from the impact.
-    if (impact.time > 0.0 ? !loaded : MovesAtStart(model, impact.before, c)) {
+    const bool jumps = impact.time <= 0.0
+                           ? MovesAtStart(model, impact.before, c)
+                           : !loaded && (!RestsOnSupports(*model.structure, impact.before, c) ||
+                                         MovesGap(model, impact.before, c));
+    if (jumps) {
       const Place place{model.structure.get(), step, impact.time, i, &c, impact.solution.modes[i]};
       AddJump(0.0, place,
               loaded ? "it is pressed when another impact moves it"

@@ -144,7 +144,9 @@ bool RolloutCertifier::KeepsSide(const Model<double>& model, const ActiveContact
   return true;
 }
 
+// Of a run without directions any may be meant.
 bool RolloutCertifier::MovesAny(const std::vector<JacobianEntry>& gradient) const {
+  if (Directions().cols() == 0) return true;
   for (Eigen::Index c = 0; c < Directions().cols(); ++c) {
     if (Moves(gradient, Directions(), c)) return true;
   }

@@ -124,8 +124,12 @@ TEST(CertifyTiesTest, ARowThatTouchesJumpsWithItsGapsAlone) {
               disc("a", 0.0, 0.0) + ", " + disc("b", 0.2, 0.0) + ", " + disc("c", 0.4, 0.0) +
               R"(], "simulation": {"stepping": "event", "dt": 0.01, "duration": 0.3}})");
   EXPECT_TRUE(Says(VerdictAtTie(scene, "bodies/a/position/x"), "discontinuous"));
-  // Its own place changes the time alone; then all are struck as before.
-  EXPECT_FALSE(Says(VerdictAtTie(scene, "bodies/b/mass"), "trustworthy"));
+  EXPECT_TRUE(Says(VerdictAtTie(scene, "bodies/c/position/x"), "discontinuous"));
+  // What opens no gap changes no impact: all are struck as before.
+  for (const char* path : {"bodies/cue/velocity/x", "bodies/cue/position/x", "bodies/b/mass"}) {
+    EXPECT_FALSE(Says(VerdictAtTie(scene, path), "discontinuous")) << path;
+  }
+  EXPECT_EQ(VerdictAtTie(scene, "bodies/cue/velocity/x"), "trustworthy");
 }
 
 // Two fingers that touch a block as they begin to push it: they meet it at once whatever its mass.
